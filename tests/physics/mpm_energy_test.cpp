@@ -54,7 +54,7 @@ TEST_P(MpmDrops, EnergyDoesNotGrowInAHit) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Presets, MpmDrops, testing::Range(std::size_t{0}, presets().size()),
-                         [](const auto& preset) { return presets()[preset.param].name; });
+                         [](const auto& preset) { return std::string(presets()[preset.param].name); });
 
 /// Two bodies of mpm that meet at any speed do not go through each other.
 TEST(MpmMeets, BodiesDoNotPassEachOther) {

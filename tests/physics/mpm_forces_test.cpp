@@ -77,7 +77,9 @@ TEST_P(ForcesOnModels, AHandPullsTheBodyToItsTarget) {
     hand.target.constant = {0.055, 0.1, 0};
     ASSERT_TRUE(simulation.set_hands({hand}, kAllThreads).ok());
     run_frames(simulation, 300);
-    EXPECT_NEAR((centre_of_mass(simulation) - Vec3d(0, 0.1, 0)).norm(), 0, 0.02);
+    const Vec3d arm = centre_of_mass(simulation) - Vec3d(0.055, 0.1, 0); // it may hang turned from the hand
+    EXPECT_NEAR(arm.norm(), 0.055, 0.015);
+    EXPECT_LT(simulation.momentum().linear.norm(), 0.02);
     ASSERT_TRUE(simulation.set_hands({}, kAllThreads).ok());
 }
 
@@ -97,7 +99,7 @@ TEST_P(ForcesOnModels, ForcesAreNoPartOfWhatIsSavedAndPinsAre) {
 }
 
 TEST_P(ForcesOnModels, WindPressesOnWhatFacesIt) {
-    const auto cube = block(6, 6, 6, 0.02, of_model(GetParam()));
+    const auto cube = block(12, 12, 12, 0.01, of_model(GetParam())); // edges are as round as the grid has them
     World world = weightless_world();
     world.wind.constant = {0, 0, 5};
     world.air_density = 1.2;

@@ -1,6 +1,6 @@
 // Matter of mpm against what is thinner than its grid: sheets, thin boxes, trays, rooms, tunnels.
+#include "filigree/physics/grid_limits.h"
 #include "filigree/physics/named_materials.h"
-#include "filigree/physics/simulation.h"
 #include "physics/obstacle_meshes.h"
 #include "threads.h"
 
@@ -121,8 +121,8 @@ TEST(MpmWalls, ASheetStopsMatterFromBothSides) {
 }
 
 TEST(MpmWalls, TerrainIsStoodOn) {
-    Simulation simulation = begin({of_mesh(meshes::terrain(24))}, {cube(melt(), {0.1, 0.35, 0.1})});
-    run(simulation, 60);
+    Simulation simulation = begin({of_mesh(meshes::terrain(24))}, {cube(melt(), {0.1, 0.25, 0.1}, 6)});
+    run(simulation, 40);
     const Vectors& positions = simulation.positions(0);
     for (std::size_t i = 0; i < positions.size(); ++i) {
         const Vec3d p = positions[i].cast<double>();
@@ -139,7 +139,7 @@ TEST(MpmWalls, ATrayHoldsMelt) {
             tray.push_back(box_at({0, height / 2, side * (w + t / 2)}, {2 * w + 2 * t, height, t}));
         }
         Simulation simulation = begin(tray, {cube(melt(), {0, 0.1, 0})});
-        run(simulation, 60);
+        run(simulation, 40);
         const Box box = box_of_body(simulation);
         EXPECT_GE(box.min.y(), 0) << t;
         EXPECT_LE(box.max.x(), w) << t;
@@ -165,7 +165,7 @@ TEST(MpmWalls, ATrayOfSheetsHoldsMeltAndARoomKeepsIt) {
     }
     for (const Mesh& mesh : {tray, room, meshes::turned_over(room)}) {
         Simulation simulation = begin({of_mesh(mesh)}, {cube(melt(), {0, -0.05, 0})});
-        run(simulation, 45);
+        run(simulation, 30);
         const Box box = box_of_body(simulation);
         EXPECT_GE(box.min.minCoeff(), -0.14);
         EXPECT_LE(box.max.maxCoeff(), 0.14);
@@ -210,6 +210,28 @@ TEST(MpmWalls, FrictionOnAThinPlateHoldsAndSlides) {
         else
             EXPECT_NEAR(way, speed * 0.5 + 0.5 * pull * 0.25, 0.1 * way);
     }
+}
+
+/// What cannot be felt is told before anything moves.
+TEST(MpmWalls, WiresAndOtherModelsAreToldOf) {
+    World world;
+    world.obstacles.push_back(box_at(Vec3d::Zero(), {0.001, 0.001, 1}));
+    world.obstacles.push_back(box_at(Vec3d::Zero(), {0.001, 1, 1}));
+    world.obstacles.emplace_back().shape = Ball{Vec3d::Zero(), 0.004};
+    world.obstacles.push_back(of_mesh(meshes::box_mesh({0, 0, 0}, {0.002f, 0.5f, 0.003f})));
+    world.obstacles.emplace_back().shape = HalfSpace{};
+    Material rubber = cold();
+    rubber.model = MaterialModel::fem;
+    const Actor matter = cube(cold(), Vec3d::Zero()), other = cube(rubber, Vec3d::Zero());
+    std::vector<std::size_t> told;
+    for (const SlenderObstacle& slender : find_slender_obstacles(world, std::span(&matter, 1))) {
+        told.push_back(slender.obstacle);
+        EXPECT_NE(slender.sentence("obstacle 'wire'").find("obstacle 'wire' is 0.0"), std::string::npos);
+    }
+    EXPECT_EQ(told, (std::vector<std::size_t>{0, 2, 3}));
+    EXPECT_TRUE(find_slender_obstacles(world, std::span(&other, 1)).empty());
+    EXPECT_EQ(why_models_do_not_meet(std::span(&matter, 1)), "");
+    EXPECT_NE(why_models_do_not_meet(std::vector{matter, other}).find("pass through"), std::string::npos);
 }
 
 TEST(MpmWalls, SameBytesForAnyNumberOfThreadsAndWhenResumed) {

@@ -219,7 +219,7 @@ void Bodies::scatter(float dt, const RunContext& context) {
 
 void Bodies::update_nodes(float dt, double time, const RunContext& context) {
     const ObstaclePoses poses(world_, time);
-    const NodeContacts contacts(grid_, world_, barriers_, laws_, actor_of_field_, context);
+    const NodeContacts contacts(grid_, world_, barriers_, laws_, actor_of_field_, grid_mass_, context);
     const Vec3f gravity = dt * world_.gravity.cast<float>();
     const Float4 kick = lanes(gravity.x(), gravity.y(), gravity.z(), 0);
     parallel_for(context, contacts.place_count(), 8, [&](std::size_t begin, std::size_t end) {
@@ -290,7 +290,7 @@ void Bodies::gather(float dt, double time, const RunContext& context) {
                 gather_at_particles(numbers, particles_.data(), h, tile, found.data());
                 for (std::size_t i = 0; i < numbers.size(); ++i) {
                     Particle& p = particles_[numbers[i]];
-                    if (behind != kNoIndex && hidden_[numbers[i]]) found[i] = gather_behind(numbers[i], tile, hidden);
+                    if (!walls.empty() && is_held(numbers[i])) found[i] = gather_beside(numbers[i], tile, hidden);
                     const auto& [value, slope] = found[i];
                     if (!std::isfinite(value[0] + value[1] + value[2])) { // it stays, at rest
                         for (int k = 0; k < 3; ++k) p.v[k] = p.c[k][0] = p.c[k][1] = p.c[k][2] = 0;
@@ -313,8 +313,8 @@ void Bodies::gather(float dt, double time, const RunContext& context) {
         });
 }
 
-/// Nodes that walls hide say what is on the particle's own side, and nothing that goes into the wall.
-AtParticle Bodies::gather_behind(std::uint32_t number, const Node* tile, const Node* behind) const {
+/// Nodes that walls hold say what is on the particle's own side, and nothing that goes into the wall.
+AtParticle Bodies::gather_beside(std::uint32_t number, const Node* tile, const Node* behind) const {
     const float h = grid_.spacing();
     const Stencil at(particles_[number].x, h);
     const Shadow& shadow = shadows_[shadow_of_[number]];
@@ -323,7 +323,7 @@ AtParticle Bodies::gather_behind(std::uint32_t number, const Node* tile, const N
     for (int n = 0; n < 27; ++n) {
         const int k[3] = {n % 3, n / 3 % 3, n / 9};
         Node node = (shadow.hides(n) ? behind : tile)[first + (k[2] * kTileSide + k[1]) * kTileSide + k[0]];
-        if (shadow.hides(n)) set_velocity(node, barriers_.behind(velocity_of(node), shadow.wall_before(n)));
+        if (shadow.holds(n)) set_velocity(node, barriers_.beside(velocity_of(node), shadow.wall_before(n)));
         const float w = at.weight[0][k[0]] * at.weight[1][k[1]] * at.weight[2][k[2]];
         for (int e = 0; e < 8; ++e) {
             const float part = w * (e < 4 ? node.motion[e] : node.matter[e - 4]);
@@ -376,7 +376,7 @@ void Bodies::move_tracer(Tracer& tracer, float dt, const Barriers::Near& walls) 
         const Node& value = grid_.node(index);
         if (!(value.motion[3] > kLeastNodeMass * grid_mass_[tracer.field])) continue;
         Vec3f velocity = velocity_of(value);
-        if (is_hidden) velocity = barriers_.behind(velocity, shadow->wall_before(n));
+        if (shadow && shadow->holds(n)) velocity = barriers_.beside(velocity, shadow->wall_before(n));
         const float w = at.weight[0][k[0]] * at.weight[1][k[1]] * at.weight[2][k[2]];
         Eigen::Vector4f row(1, 0, 0, 0);
         for (int axis = 0; axis < 3; ++axis) row[axis + 1] = at.first_way[axis] + float(k[axis]) * h;

@@ -82,7 +82,10 @@ private:
     void update_nodes(float dt, double time, const RunContext& context);
     void hold_nodes();
     void gather(float dt, double time, const RunContext& context);
-    AtParticle gather_behind(std::uint32_t number, const Node* tile, const Node* behind) const;
+    bool is_held(std::uint32_t number) const {
+        return shadow_of_[number] != kNoIndex && shadows_[shadow_of_[number]].held;
+    }
+    AtParticle gather_beside(std::uint32_t number, const Node* tile, const Node* behind) const;
     void move(std::uint32_t number, const Vec3f& way, const Barriers::Near& walls);
     void move_tracers(float dt, const RunContext& context);
     void move_tracer(Tracer& tracer, float dt, const Barriers::Near& walls) const;

@@ -13,6 +13,7 @@ constexpr double kThickCells = 4;     ///< of the grid: thinner than this an obs
 constexpr float kApart = 0.02f;       ///< spacings that particles stay off walls
 constexpr float kTooNear = 0.01f;     ///< spacings, from which on they are put so far off
 constexpr float kFarthestMove = 2.5f; ///< cells, in a step
+constexpr float kHeldBefore = 0.25f;  ///< cells
 constexpr float kSameWall = 0.95f;    ///< cosine between normals that count as one
 constexpr int kBarrierRounds = 3;     ///< where several walls meet
 
@@ -28,6 +29,12 @@ bool is_thin(const Obstacle& obstacle, double grid_spacing) {
     return mesh && mesh->surface;
 }
 
+Vec3d middle_of(const Obstacle& obstacle) {
+    if (const auto* ball = std::get_if<Ball>(&obstacle.shape)) return ball->centre;
+    const auto* box = std::get_if<Cuboid>(&obstacle.shape);
+    return box ? box->centre : Vec3d(Vec3d::Zero());
+}
+
 } // namespace
 
 Barriers::Barriers(const World& world, float spacing)
@@ -38,7 +45,7 @@ Barriers::Barriers(const World& world, float spacing)
         if (!is_wall_.back()) continue;
         const auto* mesh = std::get_if<MeshObstacle>(&obstacle.shape);
         walls_.push_back({o, ObstacleShape(obstacle), mesh ? mesh->surface.get() : nullptr,
-                          mesh ? mesh->offset : Vec3d(Vec3d::Zero()), obstacle.motion.moves()});
+                          mesh ? mesh->offset : Vec3d(Vec3d::Zero()), middle_of(obstacle), obstacle.motion.moves()});
     }
     poses_.resize(walls_.size());
 }
@@ -87,69 +94,80 @@ std::uint8_t Barriers::wall_of(Shadow& shadow, const Shadow::Wall& wall) {
     return shadow.wall_count++;
 }
 
-void Barriers::find_hidden(const Wall& wall, const Pose& pose, const Vec3f& point, Shadow& shadow) const {
-    const Vec3d own = to_own(pose.before, point);
-    DistanceField::Sample sample = {};
-    if (wall.mesh) {
-        sample.distance = float(wall.shape.clearance(own, double(reach_)));
-    } else {
-        sample = distance_to(world_.obstacles[wall.obstacle], pose.before, point);
-        if (sample.distance < 0) return; // it comes out
+Barriers::Side Barriers::side_of(const Wall& wall, const Vec3d& own) const {
+    if (!wall.mesh) {
+        const DistanceField::Sample sample =
+            distance_to(world_.obstacles[wall.obstacle], Eigen::Isometry3d::Identity(), own.cast<float>());
+        const Vec3d normal = sample.normal.cast<double>();
+        return {own - double(sample.distance) * normal, normal, double(sample.distance)};
     }
-    if (sample.distance >= reach_) return;
-    shadow.clearance = std::min(shadow.clearance, sample.distance);
+    const ClosestWall closest = wall.mesh->closest(own - wall.offset, double(reach_));
+    const Vec3d away = own - wall.offset - closest.position;
+    if (closest.triangle == kNoIndex) return {own, Vec3d::UnitY(), double(reach_)};
+    return {closest.position + wall.offset, away.norm() > 0 ? Vec3d(away.normalized()) : closest.normal, away.norm()};
+}
+
+/// Nodes that are hidden, and those so close before a wall that matter between them and it would be a soft gap.
+void Barriers::find_held(const Wall& wall, const Pose& pose, const Vec3f& point, Shadow& shadow) const {
+    const Vec3d own = to_own(pose.before, point);
+    const Side side = side_of(wall, own);
+    if (side.distance < 0 || side.distance >= double(reach_)) return; // what is inside comes out
+    shadow.clearance = std::min(shadow.clearance, float(side.distance));
+    const Mat3d turn = pose.before.linear();
     const Vec3f velocity = after_->velocity(wall.obstacle, point);
+    const Vec3d ahead = double(kHeldBefore * grid_spacing_) * side.normal;
+    // A node that lies in a sheet is on the same side for both.
+    const Vec3d aside = 1e-3 * double(grid_spacing_) * (turn.transpose() * Vec3d(0.61, 0.79, 0.57));
     const Stencil at(point.data(), grid_spacing_);
     for (int n = 0; n < 27; ++n) {
+        if (shadow.holds(n)) continue;
         const Vec3f way(at.first_way[0] + float(n % 3) * grid_spacing_,
                         at.first_way[1] + float(n / 3 % 3) * grid_spacing_,
                         at.first_way[2] + float(n / 9) * grid_spacing_);
-        if (shadow.hides(n)) continue;
-        const Vec3d node = own + pose.before.linear().transpose() * way.cast<double>();
-        Vec3f normal = sample.normal;
+        const Vec3d node = own + turn.transpose() * way.cast<double>(), beyond = node - ahead;
+        Vec3d normal = side.normal;
+        double height = 0;
         if (wall.mesh) {
-            if (way.norm() < sample.distance) continue;
-            const auto met = wall.mesh->first_crossing(own - wall.offset, node - wall.offset);
+            if ((beyond - own).norm() < side.distance) continue;
+            const auto met = wall.mesh->first_crossing(own - wall.offset, beyond - wall.offset);
             if (!met) continue;
-            normal = (pose.before.linear() * met->normal).cast<float>();
-        } else if (normal.dot(way) + sample.distance >= 0 || !wall.shape.is_between(own, node)) {
-            continue; // a box and a ball lie behind the plane through their closest point
+            normal = met->normal;
+            height = normal.dot(node + aside - wall.offset) - met->plane;
+        } else { // a box and a ball lie behind the plane through their closest point; each half has its side
+            if (side.normal.dot(beyond - side.position) >= 0 || !wall.shape.is_between(own, beyond)) continue;
+            height = normal.dot(node + aside - wall.middle);
         }
-        shadow.hidden |= 1u << n;
-        shadow.wall[std::size_t(n)] = wall_of(shadow, {std::uint32_t(wall.obstacle), normal, velocity});
+        shadow.held |= 1u << n;
+        if (height < 0) shadow.hidden |= 1u << n;
+        const Vec3f outward = (turn * normal).cast<float>();
+        shadow.wall[std::size_t(n)] = wall_of(shadow, {std::uint32_t(wall.obstacle), outward, velocity});
     }
 }
 
 std::optional<Shadow> Barriers::shadow(const Vec3f& point, const Near& near) const {
     Shadow shadow;
     shadow.clearance = reach_;
-    for (const std::uint32_t w : near) find_hidden(walls_[w], poses_[w], point, shadow);
+    for (const std::uint32_t w : near) find_held(walls_[w], poses_[w], point, shadow);
     if (shadow.clearance >= reach_) return std::nullopt;
     return shadow;
 }
 
-Vec3f Barriers::behind(const Vec3f& velocity, const Shadow::Wall& wall) const {
+Vec3f Barriers::beside(const Vec3f& velocity, const Shadow::Wall& wall) const {
     return wall.velocity +
            after_contact(velocity - wall.velocity, wall.normal, float(world_.obstacles[wall.obstacle].friction));
 }
 
 /// The direction away from a wall that a point stands too near to.
-std::optional<Vec3d> Barriers::too_near(const Wall& wall, const Pose& pose, const Vec3d& own, double least) const {
-    if (!wall.mesh) {
-        const Vec3f place = (pose.after * own).cast<float>();
-        const DistanceField::Sample sample = distance_to(world_.obstacles[wall.obstacle], pose.after, place);
-        if (!(sample.distance < float(least))) return std::nullopt;
-        return Vec3d(pose.after.linear().transpose() * sample.normal.cast<double>());
-    }
-    const ClosestWall closest = wall.mesh->closest(own - wall.offset, least);
-    if (closest.triangle == kNoIndex) return std::nullopt;
-    const Vec3d away = own - wall.offset - closest.position;
-    return away.norm() > 0 ? Vec3d(away.normalized()) : closest.normal;
+std::optional<Vec3d> Barriers::too_near(const Wall& wall, const Vec3d& own, double least) const {
+    if (wall.mesh && wall.shape.clearance(own, least) >= least) return std::nullopt;
+    const Side side = side_of(wall, own);
+    if (!(side.distance < least)) return std::nullopt;
+    return side.normal;
 }
 
 void Barriers::stop(const Wall& wall, const Vec3f& at, const Vec3f& normal, Vec3f* velocity) const {
     if (velocity)
-        *velocity = behind(*velocity, {std::uint32_t(wall.obstacle), normal, after_->velocity(wall.obstacle, at)});
+        *velocity = beside(*velocity, {std::uint32_t(wall.obstacle), normal, after_->velocity(wall.obstacle, at)});
 }
 
 bool Barriers::hold_at(const Wall& wall, const Pose& pose, const Vec3f& from, Vec3f& to, Vec3f* velocity) const {
@@ -158,12 +176,12 @@ bool Barriers::hold_at(const Wall& wall, const Pose& pose, const Vec3f& from, Ve
     Vec3d normal;
     if (wall.shape.is_solid() && wall.shape.is_inside(free)) {
         free = wall.shape.exit(target);
-        normal = too_near(wall, pose, free, double(spacing_)).value_or(Vec3d::Zero());
+        normal = too_near(wall, free, double(spacing_)).value_or(Vec3d::Zero());
     } else {
         const WallTouch touch = wall.shape.follow(free, target);
         normal = touch.normal;
         if (free == target) {
-            const auto away = too_near(wall, pose, free, double(kTooNear * spacing_));
+            const auto away = too_near(wall, free, double(kTooNear * spacing_));
             if (!away) return false;
             normal = *away;
         }

@@ -18,13 +18,15 @@ struct Shadow {
         std::uint32_t obstacle;
         Vec3f normal, velocity; ///< towards the point; m/s
     };
-    std::uint32_t hidden = 0;               ///< a bit for each node of the stencil, x fastest
-    std::array<std::uint8_t, 27> wall = {}; ///< of each hidden node
+    std::uint32_t hidden = 0;               ///< a bit for each node of the stencil that is behind a wall, x fastest
+    std::uint32_t held = 0;                 ///< the same with nodes that are close before it
+    std::array<std::uint8_t, 27> wall = {}; ///< of each node that is held
     std::array<Wall, 4> walls = {};
     std::uint8_t wall_count = 0;
     float clearance = 0; ///< m: as far as this there is no wall around the point
 
     bool hides(int node) const { return hidden >> node & 1; }
+    bool holds(int node) const { return held >> node & 1; }
     const Wall& wall_before(int node) const { return walls[wall[std::size_t(node)]]; }
 };
 
@@ -48,8 +50,8 @@ public:
     /// Takes a point that moves `from` .. `to` back to the side that it came from. velocity: m/s of it, or null; what
     /// goes into the wall is taken from it, and friction with that.
     void hold(const Vec3f& from, Vec3f& to, float clearance, const Near& near, Vec3f* velocity) const;
-    /// A velocity that a point reads from a node behind a wall.
-    Vec3f behind(const Vec3f& velocity, const Shadow::Wall& wall) const;
+    /// A velocity that a point reads from a node that a wall holds.
+    Vec3f beside(const Vec3f& velocity, const Shadow::Wall& wall) const;
     float reach() const { return reach_; } ///< m: shadows are of walls nearer than this
 
 private:
@@ -58,14 +60,20 @@ private:
         ObstacleShape shape;
         const ObstacleSurface* mesh; ///< null: a ball or a box
         Vec3d offset;                ///< of the mesh
+        Vec3d middle;                ///< of a ball or a box
         bool moves;
     };
     struct Pose { ///< of a wall, over the step
         Eigen::Isometry3d before, after;
     };
-    void find_hidden(const Wall& wall, const Pose& pose, const Vec3f& point, Shadow& shadow) const;
+    struct Side { ///< in the obstacle's axes: the closest point, and the direction from there to a point
+        Vec3d position, normal;
+        double distance;
+    };
+    Side side_of(const Wall& wall, const Vec3d& own) const;
+    void find_held(const Wall& wall, const Pose& pose, const Vec3f& point, Shadow& shadow) const;
     static std::uint8_t wall_of(Shadow& shadow, const Shadow::Wall& wall);
-    std::optional<Vec3d> too_near(const Wall& wall, const Pose& pose, const Vec3d& own, double least) const;
+    std::optional<Vec3d> too_near(const Wall& wall, const Vec3d& own, double least) const;
     bool hold_at(const Wall& wall, const Pose& pose, const Vec3f& from, Vec3f& to, Vec3f* velocity) const;
     void stop(const Wall& wall, const Vec3f& at, const Vec3f& normal, Vec3f* velocity) const;
 

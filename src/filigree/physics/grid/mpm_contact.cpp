@@ -12,7 +12,10 @@ namespace filigree::mpm {
 namespace {
 
 constexpr double kGrownTogether = 0.25f; ///< share of matter that has melted, from which on bodies are one
-constexpr float kLeastMass = 1e-7f;      ///< of the heavier body's at a node: less of another is not felt
+/// Where bodies were driven into each other there is more matter than has room, and normals lean anyhow: they are one,
+/// so that they do not pass.
+constexpr double kCrowded = 1.25, kStuck = 1.75; ///< times the mass of a full node
+constexpr float kLeastMass = 1e-7f;              ///< of the heavier body's at a node: less of another is not felt
 
 /// Mass of a body at a node of the grid, on both sides of walls.
 float mass_at(const Grid& grid, const std::array<int, 3>& node, std::uint32_t body) {
@@ -44,8 +47,9 @@ Vec3f mass_gradient(const Grid& grid, const std::array<int, 3>& node, std::uint3
 } // namespace
 
 NodeContacts::NodeContacts(const Grid& grid, const World& world, const Barriers& barriers, const PairLaws& laws,
-                           std::span<const std::size_t> actors, const RunContext& context)
-    : world_(world), barriers_(barriers), laws_(laws), actors_(actors) {
+                           std::span<const std::size_t> actors, std::span<const float> full_mass,
+                           const RunContext& context)
+    : world_(world), barriers_(barriers), laws_(laws), actors_(actors), full_mass_(full_mass) {
     for (std::uint32_t b = 0; b < grid.block_count(); ++b) {
         const BlockPlace& here = grid.place(b);
         const BlockPlace* before = b > 0 ? &grid.place(b - 1) : nullptr;
@@ -94,7 +98,7 @@ void NodeContacts::meet_bodies(Grid& grid, std::size_t place) const {
     if (here.size() < 2) return;
     std::size_t next = 0;
     for (int n = 0; n < kBlockNodes; ++n) {
-        float mass = 0, melted = 0, heaviest = 0;
+        float mass = 0, melted = 0, heaviest = 0, fullness = 0;
         std::size_t with_mass = 0;
         Vec3f momentum = Vec3f::Zero();
         for (const std::uint32_t block : here) {
@@ -103,13 +107,15 @@ void NodeContacts::meet_bodies(Grid& grid, std::size_t place) const {
             if (!(m > 0)) continue;
             ++with_mass;
             mass += m;
+            fullness += m / full_mass_[grid.place(block).body & ~kBehind];
             heaviest = std::max(heaviest, m);
             melted += m * node.matter[2];
             momentum += m * velocity_of(node);
         }
         if (with_mass < 2) continue;
         const Vec3f common = momentum / mass;
-        const auto one = float(smoothstep(0, kGrownTogether, double(melted / mass)));
+        const auto one = float(std::max(smoothstep(0, kGrownTogether, double(melted / mass)),
+                                        smoothstep(kCrowded, kStuck, double(fullness))));
         for (std::size_t k = 0; k < here.size(); ++k) {
             Node& node = grid.nodes(here[k])[n];
             const Vec3f& normal = normals_[place][next + k];

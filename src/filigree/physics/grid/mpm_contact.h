@@ -24,9 +24,9 @@ inline Vec3f after_contact(const Vec3f& relative, const Vec3f& normal, float fri
 class NodeContacts {
 public:
     /// Before nodes have velocities: looks at masses alone. actors: of each body of the grid.
-    /// barriers: obstacles that nodes do not meet.
+    /// barriers: obstacles that nodes do not meet. full_mass: of each body, kg at a node amid its matter at rest.
     NodeContacts(const Grid& grid, const World& world, const Barriers& barriers, const PairLaws& laws,
-                 std::span<const std::size_t> actors, const RunContext& context);
+                 std::span<const std::size_t> actors, std::span<const float> full_mass, const RunContext& context);
 
     /// Places of blocks, each with the blocks of all bodies there; what is behind walls is another place.
     std::size_t place_count() const { return first_block_.size() - 1; }
@@ -47,6 +47,7 @@ private:
     const Barriers& barriers_;
     const PairLaws& laws_;
     std::span<const std::size_t> actors_;
+    std::span<const float> full_mass_;
     std::vector<std::uint32_t> blocks_, first_block_;
     std::vector<std::vector<Vec3f>> normals_; ///< of each place: of nodes with several bodies, one a body; outward
 };
