@@ -15,6 +15,7 @@ namespace filigree::mpm {
 namespace {
 
 constexpr float kMostTravel = 0.4f;     ///< of a cell, in a step
+constexpr float kMostMeeting = 0.05f;   ///< of a cell, in a step, of a body towards another one
 constexpr float kLeastNodeMass = 1e-6f; ///< of a full node's: what tracers look at
 constexpr float kRidge = 0.01f;         ///< cells squared: holds a tracer's gradient at a rim
 constexpr float kHeldShare = 0.5f;      ///< of a node's mass that is pinned, from which on the node is
@@ -165,6 +166,7 @@ float Bodies::longest_step(double now, const RunContext& context) const {
     for (const float squared : fastest) squared_speed = std::max(squared_speed, squared);
     float step = kMostTravel * grid_.spacing() / std::sqrt(std::max(squared_speed, 1e-12f));
     for (const Matter& matter : matter_) step = std::min(step, matter.longest_step(grid_.spacing()));
+    if (approach_ > 0) step = std::min(step, kMostMeeting * grid_.spacing() / approach_);
     return std::min(step, longest_step_beside_obstacles(now));
 }
 
@@ -237,7 +239,7 @@ void Bodies::update_nodes(float dt, double time, const RunContext& context) {
             }
         }
     });
-    contacts.act(grid_, poses, context);
+    approach_ = contacts.act(grid_, poses, context);
     hold_nodes();
 }
 
@@ -549,6 +551,7 @@ std::string Bodies::state() const {
     ByteWriter writer;
     writer.array(std::span(particles_));
     writer.array(std::span(tracers_));
+    writer.array(std::span(&approach_, 1));
     return writer.take();
 }
 
@@ -557,12 +560,14 @@ bool Bodies::restore_state(std::string_view bytes) {
     ByteReader reader(bytes);
     std::vector<Particle> particles = reader.array<Particle>();
     std::vector<Tracer> tracers = reader.array<Tracer>();
-    if (!reader.ok() || !reader.at_end() || particles.size() != particles_.size()) return false;
+    const std::vector<float> approach = reader.array<float>();
+    if (!reader.ok() || !reader.at_end() || particles.size() != particles_.size() || approach.size() != 1) return false;
     for (std::size_t p = 0; p < particles.size(); ++p) // what never changes
         if (particles[p].mass != particles_[p].mass || particles[p].volume != particles_[p].volume) return false;
     for (const Tracer& tracer : tracers)
         if (tracer.field >= matter_.size()) return false;
     particles_ = std::move(particles);
+    approach_ = approach.front();
     // Points attached since stay where they are.
     if (tracers.size() < tracers_.size())
         tracers.insert(tracers.end(), tracers_.begin() + std::ptrdiff_t(tracers.size()), tracers_.end());

@@ -110,6 +110,7 @@ private:
     std::vector<Shadow> shadows_;
     /// By particle: what walls hide from it, and the number of its shadow. Empty: there are no walls.
     std::vector<std::uint32_t> hidden_, shadow_of_;
+    float approach_ = 0; ///< m/s, of bodies at nodes in the last step
     bool has_heat_ = false;
     std::vector<Float4> pinned_; ///< momentum and mass that are pinned, of each node
 };

@@ -84,19 +84,22 @@ NodeContacts::NodeContacts(const Grid& grid, const World& world, const Barriers&
     });
 }
 
-void NodeContacts::act(Grid& grid, const ObstaclePoses& poses, const RunContext& context) const {
+float NodeContacts::act(Grid& grid, const ObstaclePoses& poses, const RunContext& context) const {
+    std::vector<float> approach(place_count());
     parallel_for(context, place_count(), 8, [&](std::size_t begin, std::size_t end) {
         for (std::size_t place = begin; place < end; ++place) {
-            meet_bodies(grid, place);
+            approach[place] = meet_bodies(grid, place);
             meet_obstacles(grid, place, poses);
         }
     });
+    return approach.empty() ? 0 : *std::ranges::max_element(approach);
 }
 
-void NodeContacts::meet_bodies(Grid& grid, std::size_t place) const {
+float NodeContacts::meet_bodies(Grid& grid, std::size_t place) const {
     const std::span<const std::uint32_t> here = blocks(place);
-    if (here.size() < 2) return;
+    if (here.size() < 2) return 0;
     std::size_t next = 0;
+    float approach = 0;
     for (int n = 0; n < kBlockNodes; ++n) {
         float mass = 0, melted = 0, heaviest = 0, fullness = 0;
         std::size_t with_mass = 0;
@@ -121,12 +124,14 @@ void NodeContacts::meet_bodies(Grid& grid, std::size_t place) const {
             const Vec3f& normal = normals_[place][next + k];
             if (!(node.motion[3] > 0)) continue;
             Vec3f own = velocity_of(node);
-            if (heaviest * kLeastMass < mass - node.motion[3] && !normal.isZero())
-                own = common + after_contact(own - common, -normal, friction_of(grid, here, k, n));
+            const bool meets = heaviest * kLeastMass < mass - node.motion[3] && !normal.isZero();
+            if (meets) approach = std::max(approach, (own - common).dot(normal));
+            if (meets) own = common + after_contact(own - common, -normal, friction_of(grid, here, k, n));
             set_velocity(node, own + one * (common - own));
         }
         next += here.size();
     }
+    return approach;
 }
 
 std::size_t NodeContacts::actor_of(const Grid& grid, std::uint32_t block) const {
