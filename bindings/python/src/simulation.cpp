@@ -1,6 +1,8 @@
 #include "models.h"
 #include "world.h"
 
+#include "filigree/physics/grid_limits.h"
+
 #include <mutex>
 
 namespace filigree::python {
@@ -98,15 +100,18 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
     options.contacts_between_bodies = contacts_between_bodies;
     options.contacts_within_bodies = contacts_within_bodies;
     options.automatic_rigid = automatic_rigid;
+    std::vector<std::string> told;
+    if (const std::string sentence = why_models_do_not_meet(actors); !sentence.empty()) told.push_back(sentence + ".");
+    for (const SlenderObstacle& slender : find_slender_obstacles(world, actors))
+        told.push_back(slender.sentence("obstacle " + std::to_string(slender.obstacle)) + ".");
     Simulation made = LongCall{threads}([&](const RunContext& context) {
         return Simulation::create(std::move(world), std::move(actors), options, context).value();
     });
-    std::vector<std::string> overlaps;
     for (const StartOverlap& overlap : made.start_overlaps())
-        overlaps.push_back(overlap.sentence("body " + std::to_string(overlap.body),
-                                            "obstacle " + std::to_string(overlap.obstacle)) +
-                           ".");
-    warn(overlaps);
+        told.push_back(
+            overlap.sentence("body " + std::to_string(overlap.body), "obstacle " + std::to_string(overlap.obstacle)) +
+            ".");
+    warn(told);
     return SimulationPtr(new PySimulation{std::move(held), std::move(made), threads});
 }
 
@@ -333,7 +338,7 @@ newtons : array_like, (p, 3), or None
 Raises
 ------
 UsageError
-    No such body, one of 'mpm', another number of particles, numbers that are not finite.
+    No such body, another number of particles, numbers that are not finite.
 )")
         .def(
             "set_hands",

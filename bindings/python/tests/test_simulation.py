@@ -247,3 +247,19 @@ def test_air_and_heat_sources_change_while_it_runs():
             simulation.set_air(wrong, 1)
     with pytest.raises(filigree.UsageError, match=r"heat_sources\[0\]"):
         simulation.set_heat_sources([filigree.HeatSource((0, 0, 0), -1, 1)])
+
+
+def test_forces_hands_and_warnings_of_mpm():
+    wax = filigree.Body(BAR, filigree.Material("wax", temperature=290), particles=300)
+    simulation = filigree.Simulation([wax], gravity=(0, 0, 0))
+    simulation.set_forces(0, wax.mass[:, None] * [0, 3.0, 0])
+    simulation.step(10)
+    assert simulation.momentum()[0][1] == pytest.approx(wax.mass.sum() * 0.5, rel=0.05)
+    simulation.set_forces(0, None)
+    simulation.set_hands([filigree.Hand(0, (2, 0, 0), (2, -1, 0))])
+    simulation.step(10)
+    assert simulation.momentum()[0][1] < wax.mass.sum() * 0.5
+    with pytest.warns(filigree.FiligreeWarning, match="pass through bodies of other models"):
+        filigree.Simulation([wax, filigree.Body(BAR, "jelly", spacing=0.25)])
+    with pytest.warns(filigree.FiligreeWarning, match="obstacle 0 is 0.002 m wide"):
+        filigree.Simulation([wax], obstacles=[filigree.Obstacle.box((0, -2, 0), (0.002, 0.002, 4))])

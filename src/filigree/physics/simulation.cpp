@@ -73,6 +73,8 @@ BodyState begin_on_grid(SimulationState& state, const Actor& actor, std::size_t 
     body.is_on_grid = body.is_absent = true;
     body.fixed.assign(body.positions.size(), 0);
     body.inverse_mass.assign(body.positions.size(), 0);
+    body.forces = Vectors(body.positions.size());
+    body.rest_squared_frequency = state.grid->rest_squared_frequency(number);
     state.grid->set_positions(number, body.positions);
     state.grid->set_velocities(number, body.velocities);
     Mat3f turning;
@@ -179,8 +181,11 @@ void begin_pins(SimulationState& state) {
         }
         body.is_held = true;
     }
-    state.grid->begin_pins();
-    move_pins(state, 0, 0);
+    for (const BodyState& body : state.bodies)
+        if (body.is_on_grid) state.grid->set_fixed(body.actor, body.fixed);
+    for (const bool on_grid : {false, true}) move_pins(state, 0, 0, on_grid);
+    for (const BodyState& body : state.bodies)
+        if (body.is_on_grid) state.grid->move_fixed(body.actor, body.positions, body.velocities);
 }
 
 std::vector<Grip> make_grips(std::span<const Hand> hands, const SimulationState& state, const RunContext& context) {
@@ -223,9 +228,7 @@ Result<FrameReport> step_frame(SimulationState& state, const RunContext& context
     state.external.find_wind(state.bodies, from, state.options.frames_per_second, context);
     std::size_t held = step_bodies(state, from, until, report, context);
     if (context.is_cancelled()) return cancelled_error();
-    state.grid->advance(from, until, report, context);
-    for (BodyState& body : state.bodies)
-        if (body.is_on_grid) state.grid->read(body.actor, body.positions, body.velocities);
+    step_on_grid(state, from, until, report, context);
     if (context.is_cancelled()) return cancelled_error();
     held += hold_lost_particles(state);
     report.clamped_particles += held;
@@ -362,8 +365,6 @@ Status Simulation::check_vectors(std::size_t body, const Vectors& vectors, const
 
 Status Simulation::set_hands(std::vector<Hand> hands, const RunContext& context) {
     if (Status checked = check_hands(hands, body_count()); !checked) return checked;
-    for (const Hand& hand : hands)
-        if (state_->bodies[hand.body].is_on_grid) return usage("Hands do not hold bodies of the model mpm.");
     for (const Cracks& cracks : state_->cracks)
         if (!cracks.is_open()) cracks.follow_whole(state_->bodies);
     state_->external.set_grips(make_grips(hands, *state_, context));
@@ -374,8 +375,6 @@ Status Simulation::set_hands(std::vector<Hand> hands, const RunContext& context)
 Status Simulation::set_forces(std::size_t body, const Vectors& newtons) {
     if (newtons.size() > 0 || body >= body_count())
         if (Status checked = check_count(body, newtons, "forces"); !checked) return checked;
-    if (state_->bodies[body].is_on_grid && newtons.size() > 0)
-        return usage("Forces on single particles do not act on bodies of the model mpm.");
     for (std::size_t i = 0; i < newtons.size(); ++i)
         if (!newtons[i].allFinite())
             return usage("The force on particle " + std::to_string(i) + " of body " + std::to_string(body) +

@@ -6,6 +6,7 @@
 #include "filigree/io/model_file.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/triangulate.h"
+#include "filigree/physics/grid_limits.h"
 #include "filigree/scene/own_weight.h"
 #include "filigree/scene/particles_near.h"
 
@@ -74,7 +75,7 @@ public:
             result_.world.forces.push_back(
                 {force.body, particles_of(force.body, force.region, force.line), force.newtons});
         for (const SceneHand& hand : scene_.hands) add_hand(hand);
-        warn_of_models_that_do_not_meet();
+        warn_of_what_mpm_does_not_feel();
         result_.world.gravity = scene_.gravity;
         result_.world.wind = scene_.wind;
         result_.world.air_density = scene_.air_density;
@@ -95,11 +96,13 @@ public:
 private:
     void warn(std::string sentence) { result_.warnings.push_back(std::move(sentence)); }
 
-    void warn_of_models_that_do_not_meet() {
-        std::size_t on_grid = 0;
-        for (const SceneBody& body : scene_.bodies) on_grid += body.material.model == MaterialModel::mpm;
-        if (on_grid > 0 && on_grid < scene_.bodies.size())
-            warn("bodies of the model mpm touch obstacles and each other, and pass through bodies of other models");
+    void warn_of_what_mpm_does_not_feel() {
+        if (std::string sentence = why_models_do_not_meet(result_.actors); !sentence.empty()) warn(std::move(sentence));
+        for (const SlenderObstacle& slender : find_slender_obstacles(result_.world, result_.actors)) {
+            const SceneObstacle& obstacle = scene_.obstacles[slender.obstacle];
+            const std::string& name = obstacle.mesh.empty() ? obstacle.shape : obstacle.mesh;
+            warn(slender.sentence(fmt::format("obstacle '{}' (line {})", name, obstacle.line)));
+        }
     }
 
     Mesh mesh_of(const std::string& bytes, const std::string& path) {

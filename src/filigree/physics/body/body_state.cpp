@@ -19,18 +19,6 @@ constexpr double kLight = 0.3, kLightBeside = 0.2; ///< of what a full cell give
 constexpr double kSurfaceStiffness = 4;            ///< times the stiffness of a spacing of material under the point
 constexpr float kTogether = 1; ///< spacings between two ways of placing a point; further, its particles came apart
 
-/// A gradient with its stretches within [1 / kMostFlow, kMostFlow].
-Mat3f bounded_stretch(const Mat3f& gradient) {
-    if (!gradient.allFinite()) return Mat3f::Identity();
-    // Of stretches a >= b >= c: a <= |F|, and c = det F / (a b) >= 2 det F / |F|^2.
-    const float squared = gradient.squaredNorm();
-    if (squared < kMostFlow * kMostFlow && 2 * std::abs(gradient.determinant()) * kMostFlow > 1.0001f * squared)
-        return gradient;
-    const SingularValues<float> svd = singular_values(gradient);
-    if (svd.s.maxCoeff() <= kMostFlow && svd.s.minCoeff() >= 1 / kMostFlow) return gradient;
-    return svd.u * svd.s.cwiseMax(1 / kMostFlow).cwiseMin(kMostFlow).asDiagonal() * svd.v.transpose();
-}
-
 void bound_stretches(std::span<Mat3f> gradients, const RunContext& context) {
     parallel_for(context, gradients.size(), kBodyStateGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) gradients[i] = bounded_stretch(gradients[i]);
@@ -59,6 +47,17 @@ const Cells* corners_of(const Body& body) {
 }
 
 } // namespace
+
+Mat3f bounded_stretch(const Mat3f& gradient) {
+    if (!gradient.allFinite()) return Mat3f::Identity();
+    // Of stretches a >= b >= c: a <= |F|, and c = det F / (a b) >= 2 det F / |F|^2.
+    const float squared = gradient.squaredNorm();
+    if (squared < kMostFlow * kMostFlow && 2 * std::abs(gradient.determinant()) * kMostFlow > 1.0001f * squared)
+        return gradient;
+    const SingularValues<float> svd = singular_values(gradient);
+    if (svd.s.maxCoeff() <= kMostFlow && svd.s.minCoeff() >= 1 / kMostFlow) return gradient;
+    return svd.u * svd.s.cwiseMax(1 / kMostFlow).cwiseMin(kMostFlow).asDiagonal() * svd.v.transpose();
+}
 
 std::vector<std::uint8_t> light_particles(const Body& body) {
     const std::vector<float>& mass = body.mass;

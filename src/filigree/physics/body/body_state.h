@@ -35,7 +35,7 @@ struct BodyState {
     std::size_t first_piece = 0;              ///< ... and the first of their numbers
     std::unique_ptr<Elasticity> elasticity;
     Vectors positions, velocities;    ///< world, m and m/s
-    Vectors forces;                   ///< N, of the last evaluation
+    Vectors forces;                   ///< N, of the last evaluation; on the grid those from outside alone
     std::vector<float> inverse_mass;  ///< 0: pinned
     std::vector<std::uint8_t> fixed;  ///< 1: pinned
     float rest_squared_frequency = 0; ///< ElasticReport::squared_frequency at rest
@@ -65,20 +65,24 @@ struct BodyState {
     /// neighbourhoods were last renewed. Empty: never; the reference is the body at rest.
     std::vector<Mat3f> flow;
     bool has_flowed() const { return !flow.empty(); }
+
+    /// What the particles' places are compared with: of a body on the grid, those at rest.
+    const Vectors& reference() const { return elasticity ? elasticity->reference() : body->rest; }
 };
+
+/// A gradient with its stretches within 1/4 and 4; the identity for one that is not finite.
+Mat3f bounded_stretch(const Mat3f& gradient);
 
 /// Of each corner, whether its cells are hardly filled. Such corners fly to and fro beside the rest at ten times its
 /// speed, and carry nothing.
 std::vector<std::uint8_t> light_particles(const Body& body);
 void find_light_corners(BodyState& state);
 
-/// Calls visit(body, number, particle) for a particle of a body, or of one that has broken for each of its copies; of
-/// one on the grid not at all.
+/// Calls visit(body, number, particle) for a particle of a body, or of one that has broken for each of its copies.
 template <class State, class Visit>
 void each_copy(std::span<State> bodies, std::size_t body, Index particle, const Visit& visit) {
     const BodyState& whole = bodies[body];
-    if (whole.is_on_grid) return;
-    if (!whole.is_absent) return visit(bodies[body], body, particle);
+    if (!whole.is_absent || whole.is_on_grid) return visit(bodies[body], body, particle);
     for (const CornerCopy& copy : whole.broken->copies_of(particle))
         visit(bodies[whole.first_piece + copy.piece], whole.first_piece + copy.piece, copy.corner);
 }

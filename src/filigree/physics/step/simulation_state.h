@@ -51,6 +51,9 @@ struct SimulationState {
 double step_explicitly(SimulationState& state, double from, double until, FrameReport& report,
                        const RunContext& context);
 
+/// Steps bodies of mpm. Breaks off when cancelled.
+void step_on_grid(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context);
+
 // Parts of a substep.
 
 /// What a body's elasticity met, into the frame's report.
@@ -58,7 +61,8 @@ void note_deformation(FrameReport& report, std::size_t body, const ElasticReport
 
 float least_spacing(std::span<const BodyState> bodies);
 /// Puts pinned particles where their motion has them at `now`, with its velocity; dt: of the substep, 0 at the start.
-void move_pins(SimulationState& state, double now, float dt);
+/// Of bodies on the grid, or of the others.
+void move_pins(SimulationState& state, double now, float dt, bool on_grid = false);
 /// Starts that no step can take: coincident particles are shaken apart, and what is stretched too far is scaled down.
 /// Whether anything was done.
 bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic, FrameReport& report,

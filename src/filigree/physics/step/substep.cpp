@@ -74,9 +74,10 @@ float least_spacing(std::span<const BodyState> bodies) {
     return spacing;
 }
 
-void move_pins(SimulationState& state, double now, float dt) {
+void move_pins(SimulationState& state, double now, float dt, bool on_grid) {
     for (std::size_t p = 0; p < state.world.pins.size(); ++p) {
         const Pin& pin = state.world.pins[p];
+        if (state.bodies[pin.body].is_on_grid != on_grid) continue;
         const Eigen::Isometry3d motion = pin.motion.at(now);
         const MotionRate rate = rate_of(pin.motion, now);
         for (std::size_t k = 0; k < pin.particles.size(); ++k) {
