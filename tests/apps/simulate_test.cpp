@@ -66,15 +66,51 @@ TEST_F(Simulate, LeavesWithACodeOfItsOwnWhereTheMotionBrokeDown) {
     EXPECT_EQ(run({"simulate", "drop.toml", "-o", "drop.fil"}).code, 0);
 }
 
-TEST_F(Simulate, WarnsOfCrushedBodiesAndSaysWhatIsMovedAsRigid) {
-    write("crush.toml",
-          "[simulation]\nframes = 30\n[[obstacle]]\nshape = \"ground\"\n"
-          "[[body]]\nname = \"jelly\"\nshape = \"wavy-cube\"\nsize = 0.3\nparticles = 64\n"
-          "young_modulus = 2e3\ncentre = [0, 0.3, 0]\nvelocity = [0, -12, 0]\n"
-          "[[body]]\nname = \"crumb\"\nshape = \"wavy-cube\"\nsize = 0.3\nparticles = 8\ncentre = [1, 0.3, 0]\n");
-    const std::string said = run({"simulate", "crush.toml", "-o", "crush.fil"}).err;
-    EXPECT_NE(said.find("body 'jelly': cells were crushed to "), std::string::npos) << said;
-    EXPECT_NE(said.find("body 'crumb' is moved as a rigid body: it has only 1 cell"), std::string::npos) << said;
+TEST_F(Simulate, LeavesWithThatCodeWhereCellsWereInsideOutOrEnergyGrew) {
+    const std::string cube = "[simulation]\nframes = 8\n[[body]]\nname = \"cube\"\nshape = \"wavy-cube\"\n"
+                             "resolution = 8\namplitude = 0\nparticles = 200\ndriver = 60\n";
+    write("sunk.toml", cube + "[[obstacle]]\nshape = \"ground\"\n");
+    write("turned.toml",
+          cube + "[[pin]]\nbox = { min = [-1, -1, -1], max = [1, -0.3, 1] }\n[[pin]]\nbox = { min = [-1, 0.3, -1], "
+                 "max = [1, 1, 1] }\nmove = [{ time = 0, value = [0, 0, 0] }, { time = 0.1, value = [0, -1.5, 0] }]\n");
+    for (const auto& [name, what] :
+         {std::pair{"sunk", "energy came from nowhere"}, std::pair{"turned", "cells were inside out"}}) {
+        const std::string scene = name + std::string(".toml"), model = name + std::string(".fil");
+        const Ran ran = run({"simulate", scene, "-o", model});
+        EXPECT_EQ(ran.code, 10) << ran.err;
+        EXPECT_NE(ran.err.find(scene + ": " + what), std::string::npos) << ran.err;
+        EXPECT_TRUE(std::filesystem::exists(path(model)));
+        // For every kind of output, a run that is resumed, and a sweep.
+        EXPECT_EQ(run({"simulate", scene, "-o", "meshes/"}).code, 10);
+        EXPECT_EQ(run({"simulate", scene, "-o", "out.glb", "-o", "out.pc2"}).code, 10);
+        EXPECT_EQ(run({"simulate", scene, "--save", "state"}).code, 10);
+        EXPECT_EQ(run({"simulate", scene, "--resume", "state", "-o", "again.fil"}).code, 10);
+        const Ran sweep = run({"sweep", scene, "-o", "table.csv", "--set", "body.density=1000,1001"});
+        EXPECT_EQ(sweep.code, 10) << sweep.err;
+        EXPECT_NE(sweep.err.find("table.csv: 2 runs broke down (run 1, 2)"), std::string::npos) << sweep.err;
+        const Json said = Json::parse(run({"simulate", scene, "-o", model, "--json"}).out);
+        EXPECT_NE(said.at("doubt").get<std::string>().find(what), std::string::npos);
+    }
+    EXPECT_TRUE(json(words("drop.toml", {"--check"})).at("doubt").is_null());
+}
+
+TEST_F(Simulate, SaysWhatIsMovedAsRigid) {
+    write("crumb.toml", "[simulation]\nframes = 3\n[[body]]\nname = \"crumb\"\nshape = \"wavy-cube\"\nsize = 0.3\n"
+                        "particles = 8\ncentre = [1, 0.3, 0]\n");
+    const Ran ran = run({"simulate", "crumb.toml", "-o", "crumb.fil"});
+    EXPECT_NE(ran.out.find("body 'crumb' is moved as a rigid body: it has only 1 cell"), std::string::npos) << ran.out;
+    EXPECT_EQ(ran.err.find("warning"), std::string::npos) << ran.err;
+}
+
+TEST_F(Simulate, RepeatedBodiesHaveOneRow) {
+    write("heap.toml", "[simulation]\nframes = 2\n[[body]]\nname = \"stone\"\nshape = \"wavy-cube\"\nsize = 0.2\n"
+                       "resolution = 8\nmaterial = \"stone\"\nparticles = 27\nrepeat = { count = 5, step = [0.5, 0, 0] "
+                       "}\n");
+    const std::string said = ok({"simulate", "heap.toml", "-o", "heap.fil"}).out;
+    EXPECT_NE(said.find("stone, 5 times"), std::string::npos) << said;
+    EXPECT_EQ(said.find("stone.2,"), std::string::npos) << said;
+    for (int k = 1; k <= 5; ++k) EXPECT_EQ(poses("heap_stone." + std::to_string(k) + ".fil").frames.size(), 3u);
+    EXPECT_EQ(json(words("heap.toml", {"-o", "heap.fil"}))["bodies"].size(), 5u);
 }
 
 TEST_F(Simulate, SaysWhyFramesWereMadeByDescent) {
