@@ -52,7 +52,7 @@ struct BodyOptions {
 struct JoinedParts {
     std::size_t corners = 0;     ///< of cells that join them; 0: none, or too few to matter
     Vec3f place = Vec3f::Zero(); ///< m, where the gap is narrowest, on the body at rest
-    double gap = 0;              ///< m, about: how wide it is there
+    double gap = 0;              ///< m, about: at half of these corners it is wider
 };
 
 struct BodyReport {

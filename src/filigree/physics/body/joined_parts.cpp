@@ -42,6 +42,9 @@ struct SampleBlock {
     bool is_empty() const {
         return std::ranges::all_of(rows, [](Word word) { return word == 0; });
     }
+    bool is_full() const {
+        return std::ranges::all_of(rows, [](Word word) { return Word(~word) == 0; });
+    }
     int count() const {
         int bits = 0;
         for (const Word word : rows) bits += std::popcount(word);
@@ -121,6 +124,7 @@ public:
     /// Steps of samples between two parts around a corner of cells, 0 where it joins nothing.
     int gap(const Cells::LatticeIndex& corner) const {
         const auto inside = block<std::uint8_t>(corner, kNear);
+        if (inside.is_full()) return 0;
         NearBlock part = inside.first();
         part.flood(inside);
         const NearBlock others = inside.without(part);
@@ -172,6 +176,26 @@ private:
     const Occupancy& samples_;
 };
 
+JoinedParts parts_of(const std::vector<std::uint8_t>& gaps, const Cells& cells) {
+    std::vector<std::uint8_t> all;
+    JoinedParts joined;
+    std::size_t narrowest = gaps.size();
+    for (std::size_t c = 0; c < gaps.size(); ++c) {
+        if (gaps[c] == 0) continue;
+        all.push_back(gaps[c]);
+        if (narrowest == gaps.size() || gaps[c] < gaps[narrowest]) narrowest = c;
+    }
+    if (all.size() < kFewestCorners || double(all.size()) < kFewCorners * double(gaps.size())) return joined;
+    const auto middle = all.begin() + std::ptrdiff_t(all.size() / 2);
+    std::nth_element(all.begin(), middle, all.end());
+    const double step = cells.spacing / kSamplesAlong;
+    joined.corners = all.size();
+    joined.gap = *middle * step;
+    const auto& at = cells.corners[narrowest];
+    joined.place = (cells.origin + cells.spacing * Vec3d(at[0], at[1], at[2])).cast<float>();
+    return joined;
+}
+
 Grid grid_of(const Cells& cells, double scale) {
     Grid grid{cells.spacing / scale, cells.origin / scale, {}};
     for (const auto& cell : cells.cells)
@@ -202,31 +226,20 @@ Result<JoinedParts> find_joined_parts(std::span<const Vec3f> positions, const We
             gaps[c] = std::uint8_t(finder.gap(cells.corners[c]));
     });
     if (quiet.is_cancelled()) return cancelled_error();
-    JoinedParts joined;
-    std::size_t worst = gaps.size();
-    for (std::size_t c = 0; c < gaps.size(); ++c) {
-        if (gaps[c] == 0) continue;
-        ++joined.corners;
-        if (worst == gaps.size() || gaps[c] < gaps[worst]) worst = c;
-    }
-    if (joined.corners < kFewestCorners || double(joined.corners) < kFewCorners * double(gaps.size()))
-        return JoinedParts{};
-    joined.gap = gaps[worst] * cells.spacing / kSamplesAlong;
-    const auto& at = cells.corners[worst];
-    joined.place = (cells.origin + cells.spacing * Vec3d(at[0], at[1], at[2])).cast<float>();
-    return joined;
+    return parts_of(gaps, cells);
 }
 
 std::string joined_sentence(const JoinedParts& joined, double spacing, std::size_t particles) {
     if (joined.corners == 0) return "";
     const double finer = joined.gap / 2; // for any place of the gap between the cells
     const double count = double(particles) * std::pow(spacing / finer, 3);
+    const double unit = std::pow(10, std::floor(std::log10(count)) - 1); // of the second digit
     const Vec3f& at = joined.place;
-    return "Parts with a gap between them are nearer to each other than particles and move as one, at " +
-           with_commas(joined.corners) + " corners of cells; the gap is narrowest, about " + two_digits(joined.gap) +
-           " m, near (" + two_digits(double(at.x())) + ", " + two_digits(double(at.y())) + ", " +
-           two_digits(double(at.z())) + ") m. A spacing of " + two_digits(finer) + " m (about " + two_digits(count) +
-           " particles) parts them.";
+    return "Parts with a gap between them are nearer to each other than two particles and move as one, at " +
+           with_commas(joined.corners) + " corners of cells; the gap is about " + two_digits(joined.gap) +
+           " m wide, and narrowest near (" + two_digits(double(at.x())) + ", " + two_digits(double(at.y())) + ", " +
+           two_digits(double(at.z())) + ") m. A spacing of " + two_digits(finer) + " m (about " +
+           with_commas(std::uint64_t(std::round(count / unit) * unit)) + " particles) parts most of them.";
 }
 
 } // namespace filigree
