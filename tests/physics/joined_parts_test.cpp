@@ -45,7 +45,7 @@ TEST(JoinedParts, FingersCloserThanTwoCellsAreTold) {
     for (const double gap : {0.015, 0.03, 0.05, 0.07}) {
         const BodyReport report = report_of(fork(gap), 0.0487);
         EXPECT_GT(report.joined.corners, 40U) << gap;
-        EXPECT_NEAR(report.joined.gap, gap, 0.0487 / 4 + 1e-9);
+        EXPECT_NEAR(report.joined.gap, gap, 1.5 * 0.0487 / 4);
         EXPECT_GT(report.joined.place.x(), 0.0f);
         EXPECT_NEAR(double(report.joined.place.y()), 0.2 + gap / 2, 0.06);
         EXPECT_NE(report.warning.find("move as one"), std::string::npos) << report.warning;

@@ -104,7 +104,7 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
     std::vector<std::string> sentences;
     for (std::size_t b = 0; b < actors.size(); ++b)
         if (const std::string weight =
-                weight_warning(*actors[b].body, actors[b].placement.linear(), world.gravity, "matter as soft as this");
+                weight_warning(*actors[b].body, actors[b].placement.linear(), world.gravity, "such soft matter");
             !weight.empty())
             sentences.push_back("Body " + std::to_string(b) + " " + weight);
     warn(sentences);

@@ -205,7 +205,7 @@ Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<con
     };
     const Vec3d gravity = options.gravity ? Vec3d(-kEarthGravity * up) : Vec3d(Vec3d::Zero());
     if (const std::string weight =
-            weight_warning(*dropped->body, Mat3d::Identity(), gravity, "matter as soft as this", options.size);
+            weight_warning(*dropped->body, Mat3d::Identity(), gravity, "such soft matter", options.size);
         !weight.empty())
         warn("The body " + weight);
     if (const std::string coarse =

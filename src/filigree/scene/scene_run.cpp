@@ -16,6 +16,8 @@ namespace filigree {
 
 namespace {
 
+/// Frames in each of which the energy is looked at, and then every so many: it costs a twenty-fifth of a frame.
+constexpr std::uint64_t kEveryFrameUntil = 8, kEnergyFrames = 4;
 /// Elastic energy of a strain of 1e-4, as a part of the stiffness: rounding.
 constexpr double kEnergyNoise = 1e-8;
 
@@ -186,6 +188,7 @@ void SceneRun::note_doubts(const FrameReport& report) {
 
 /// Whether there is more energy than there was when all was last left to itself.
 void SceneRun::watch_energy() {
+    if (frame() > kEveryFrameUntil && frame() % kEnergyFrames != 0) return;
     EnergyWatch& watch = recording_.energy;
     if (!watch.has_begun) {
         if (simulation_.time() >= left_alone_from(*scene_)) watch.begin(energy());

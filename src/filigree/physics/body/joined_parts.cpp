@@ -190,7 +190,7 @@ JoinedParts parts_of(const std::vector<std::uint8_t>& gaps, const Cells& cells) 
     std::nth_element(all.begin(), middle, all.end());
     const double step = cells.spacing / kSamplesAlong;
     joined.corners = all.size();
-    joined.gap = *middle * step;
+    joined.gap = (*middle - 0.5) * step; // between one step less and one more
     const auto& at = cells.corners[narrowest];
     joined.place = (cells.origin + cells.spacing * Vec3d(at[0], at[1], at[2])).cast<float>();
     return joined;
