@@ -75,14 +75,17 @@ TEST(OwnWeight, WhatIsRigidOrFlowsIsNotAsked) {
 TEST(BodySize, IsTheLongestSideAndNotBesideAScale) {
     const Body body = body_of(named("rubber"), 0.3);
     EXPECT_NEAR(body.scale, 0.3 / 2, 1e-7);
-    const auto refused = [](BodyOptions options, const Mesh& mesh) {
+    const auto refused = [](double scale, double size, const Mesh& mesh) {
+        BodyOptions options;
+        options.scale = scale;
+        options.size = size;
         const Result<Body> body = make_body(mesh, {}, options, kOneThread);
         return body ? std::string() : body.error().message;
     };
     const Mesh bar = make_bar({.resolution = 2});
-    EXPECT_NE(refused({.scale = 2, .size = 1}, bar).find("scale or size, not both"), std::string::npos);
+    EXPECT_NE(refused(2, 1, bar).find("scale or size, not both"), std::string::npos);
     for (const double size : {0.0, -1.0, std::numeric_limits<double>::infinity(), std::nan("")})
-        EXPECT_NE(refused({.size = size}, bar).find("above 0"), std::string::npos) << size;
+        EXPECT_NE(refused(1, size, bar).find("above 0"), std::string::npos) << size;
 }
 
 /// A cube of which some cells are turned inside out by hand.

@@ -7,6 +7,7 @@
 #include "filigree/physics/body/mesh_cells.h"
 #include "filigree/physics/body/occupied_cells.h"
 #include "filigree/physics/body/surface_points.h"
+#include "filigree/physics/simulation.h"
 
 #include <algorithm>
 #include <cassert>
@@ -224,7 +225,7 @@ std::string warning_of(const Body& body, const BodyReport& report) {
         if (!sentence.empty()) warning += (warning.empty() ? "" : " ") + sentence;
     };
     const CellReport& cells = report.cells;
-    const bool bends = body.material.model != MaterialModel::rigid;
+    const bool bends = body.material.model != MaterialModel::rigid && cells.cells >= kFewestElasticCells;
     if (bends && double(cells.thin_cells) > kManyThin * double(cells.cells))
         add(std::to_string(cells.thin_cells) + " of " + std::to_string(cells.cells) +
             " cells lie in parts fewer than two cells across, which will be too soft or too stiff there; more "

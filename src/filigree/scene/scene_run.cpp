@@ -313,10 +313,11 @@ std::string SceneRun::inversion_warning(std::size_t b) const {
 std::string SceneRun::energy_warning() const {
     const EnergyWatch& watch = recording_.energy;
     if (!(watch.grown > 0)) return "";
-    return fmt::format("the energy grew by {:.3g} J, {:.2g} % of what there was, first in frame {} and most in frame "
+    const std::string part = watch.share < 10 ? fmt::format(", {:.2g} % of what there was", 100 * watch.share) : "";
+    return fmt::format("the energy grew by {:.3g} J{}, first in frame {} and most in frame "
                        "{}, and nothing did that work; body '{}', near {}, moves most: move apart what starts inside "
                        "something, or make it slower or softer (young_modulus)",
-                       watch.grown, 100 * watch.share, watch.first, watch.worst, ready_->bodies[watch.body].name,
+                       watch.grown, part, watch.first, watch.worst, ready_->bodies[watch.body].name,
                        place_text(watch.place));
 }
 
