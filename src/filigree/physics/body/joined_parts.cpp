@@ -19,8 +19,8 @@ using mesh_cells::Grid;
 
 constexpr unsigned kSamplesAlong = 4; // of a cell
 constexpr double kMostBoxCells = 0x1p24;
-constexpr int kNear = 1, kFar = 4; ///< cells to either side of a corner that are looked at
-constexpr int kLeastPart = 64;     ///< samples: smaller parts are flecks
+constexpr int kCellsNear = 1, kCellsFar = 4; ///< cells to either side of a corner that are looked at
+constexpr int kLeastPart = 64;               ///< samples: smaller parts are flecks
 /// Of all corners: fewer that join something are creases, where two parts part that hang together further on.
 constexpr double kFewCorners = 0.004;
 constexpr std::size_t kFewestCorners = 6;
@@ -114,8 +114,8 @@ struct SampleBlock {
 
 using NearBlock = SampleBlock<std::uint8_t>; // two cells along each axis
 using FarBlock = SampleBlock<std::uint32_t>; // eight
-static_assert(NearBlock::kSide == 2 * kNear * int(kSamplesAlong));
-static_assert(FarBlock::kSide == 2 * kFar * int(kSamplesAlong));
+static_assert(NearBlock::kSide == 2 * kCellsNear * int(kSamplesAlong));
+static_assert(FarBlock::kSide == 2 * kCellsFar * int(kSamplesAlong));
 
 class GapFinder {
 public:
@@ -123,13 +123,13 @@ public:
 
     /// Steps of samples between two parts around a corner of cells, 0 where it joins nothing.
     int gap(const Cells::LatticeIndex& corner) const {
-        const auto inside = block<std::uint8_t>(corner, kNear);
+        const auto inside = block<std::uint8_t>(corner, kCellsNear);
         if (inside.is_full()) return 0;
         NearBlock part = inside.first();
         part.flood(inside);
         const NearBlock others = inside.without(part);
         if (others.is_empty()) return 0;
-        const auto around = block<std::uint32_t>(corner, kFar);
+        const auto around = block<std::uint32_t>(corner, kCellsFar);
         FarBlock reached = moved(part.first());
         reached.flood(around);
         const FarBlock left = moved(others).without(reached);
@@ -165,7 +165,7 @@ private:
         return found;
     }
     static FarBlock moved(const NearBlock& block) {
-        constexpr int kAside = (kFar - kNear) * int(kSamplesAlong);
+        constexpr int kAside = (kCellsFar - kCellsNear) * int(kSamplesAlong);
         FarBlock found;
         for (int z = 0; z < block.kSide; ++z)
             for (int y = 0; y < block.kSide; ++y)
