@@ -90,21 +90,6 @@ void report_fracture(const ReadyBody& body, const FractureReport& broken, Json& 
             : fmt::format("none; {} pieces hold", with_commas(broken.pieces)));
 }
 
-/// Why descent took over, where it did.
-void report_descent(const DescentCauses& causes, Report& report) {
-    std::vector<std::string> reasons;
-    const auto add = [&](std::uint64_t frames, const char* reason) {
-        if (frames > 0) reasons.push_back(fmt::format("{} {}", with_commas(frames), reason));
-    };
-    add(causes.chosen, "because the scene says so");
-    add(causes.too_many_substeps, "that would have taken too many substeps");
-    add(causes.not_finite, "that came to no finite numbers and were done again");
-    if (!reasons.empty()) report.row("frames by descent", fmt::format("{}", fmt::join(reasons, ", ")));
-    report.set("descent_causes", {{"chosen", causes.chosen},
-                                  {"too_many_substeps", causes.too_many_substeps},
-                                  {"not_finite", causes.not_finite}});
-}
-
 /// A frame's milliseconds, on average.
 void report_times(const RunTimes& times, Report& report) {
     const auto ms = [&](double seconds) { return 1e3 * seconds / double(std::max<std::uint64_t>(times.frames, 1)); };
@@ -142,13 +127,8 @@ void report_frames(const SceneFile& scene, const SceneRun& run, Report& report) 
     report.add("frames", fmt::format("{} of {}, at {} a second", t.frames, scene.frames, scene.step.frames_per_second),
                "frames", t.frames);
     report.set("frames_per_second", scene.step.frames_per_second);
-    report.set("explicit_frames", t.explicit_frames);
-    report.set("descent_frames", t.descent_frames);
-    report.add("substeps",
-               fmt::format("{} to {} a frame, {:.3g} on average; {} frames explicit, {} by descent", least,
-                           t.most_substeps, mean, t.explicit_frames, t.descent_frames),
-               "substeps", {{"min", least}, {"mean", mean}, {"max", t.most_substeps}});
-    report_descent(run.descent_causes(), report);
+    report.add("substeps", fmt::format("{} to {} a frame, {:.3g} on average", least, t.most_substeps, mean), "substeps",
+               {{"min", least}, {"mean", mean}, {"max", t.most_substeps}});
     report_times(run.times(), report);
     report_totals(t, report);
     const Energy end = run.energy();

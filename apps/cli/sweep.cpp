@@ -314,9 +314,8 @@ Command sweep_command() {
                     Option("--finer", options->finer, "Also how far they are from those of eight times the particles"),
                     Option("--chunk", options->chunk,
                            "K/N: the K-th of N parts of the runs alone, while other processes do the others")},
-            .examples =
-                "  filigree sweep bounce.toml -o table.csv --set body.young_modulus=1e4,1e5,1e6 --check\n"
-                "  filigree sweep a.toml b.toml -o table.csv --set simulation.mode=explicit,descent --chunk 3/40",
+            .examples = "  filigree sweep bounce.toml -o table.csv --set body.young_modulus=1e4,1e5,1e6 --check\n"
+                        "  filigree sweep a.toml b.toml -o table.csv --set simulation.mode=auto,explicit --chunk 3/40",
             .run = [options](Session& session) { run(*options, session); }};
 }
 

@@ -62,9 +62,8 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
                               const py::object& wind, double air_density, const py::object& air_temperature,
                               double air_heat_transfer, const std::vector<HeatSource>& heat_sources, double friction,
                               double restitution, double frames_per_second, const std::string& mode,
-                              unsigned most_substeps, unsigned descent_substeps, unsigned descent_iterations,
-                              bool contacts_between_bodies, bool contacts_within_bodies, bool automatic_rigid,
-                              unsigned threads) {
+                              unsigned most_substeps, bool contacts_between_bodies, bool contacts_within_bodies,
+                              bool automatic_rigid, unsigned threads) {
     std::vector<PyBody> held;
     std::vector<Actor> actors;
     for (const py::handle given : py::list(bodies)) {
@@ -94,10 +93,11 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
     options.frames_per_second = frames_per_second;
     options.mode = value_of<StepMode>(
         mode, "mode",
-        {{"auto", StepMode::automatic}, {"explicit", StepMode::explicit_steps}, {"descent", StepMode::descent}});
+        {{"auto", StepMode::automatic}, {"explicit", StepMode::explicit_steps}, {"descent", StepMode::automatic}});
+    if (mode == "descent" &&
+        PyErr_WarnEx(PyExc_DeprecationWarning, "mode='descent' is gone: 'auto' takes its place.", 1))
+        throw py::error_already_set();
     options.most_substeps = most_substeps;
-    options.descent_substeps = descent_substeps;
-    options.descent_iterations = descent_iterations;
     options.contacts_between_bodies = contacts_between_bodies;
     options.contacts_within_bodies = contacts_within_bodies;
     options.automatic_rigid = automatic_rigid;
@@ -115,10 +115,7 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
 }
 
 py::dict said_of(const FrameReport& report) {
-    constexpr const char* causes[] = {"", "chosen", "too_many_substeps", "not_finite"};
     py::dict said, seconds;
-    said["used"] = report.used == StepMode::descent ? "descent" : "explicit";
-    said["why_descent"] = causes[static_cast<std::size_t>(report.why_descent)];
     said["substeps"] = report.substeps;
     said["contacts"] = report.contacts;
     said["deepest_contact"] = report.deepest_contact;
@@ -249,8 +246,8 @@ friction, restitution : float
     Where bodies touch each other.
 frames_per_second : float
 mode : str
-    'auto', 'explicit' or 'descent' (docs/bodies.md); `most_substeps`, `descent_substeps` and `descent_iterations` belong
-    to it.
+    'auto': bodies that would need more than `most_substeps` a frame become rigid. 'explicit': they stay elastic,
+    whatever they cost.
 contacts_between_bodies, contacts_within_bodies : bool
 automatic_rigid : bool
     Bodies too small or stiff to be stepped as elastic become rigid.
@@ -284,10 +281,9 @@ Examples
             py::arg("wind") = py::make_tuple(0, 0, 0), py::arg("air_density") = 0.0, py::arg("air_temperature") = 293.0,
             py::arg("air_heat_transfer") = 0.0, py::arg("heat_sources") = py::tuple(), py::arg("friction") = 0.3,
             py::arg("restitution") = 0.7, py::arg("frames_per_second") = 60.0, py::arg("mode") = "auto",
-            py::arg("most_substeps") = 256, py::arg("descent_substeps") = 4, py::arg("descent_iterations") = 8,
-            py::arg("contacts_between_bodies") = true, py::arg("contacts_within_bodies") = true,
-            py::arg("automatic_rigid") = true, py::arg("threads") = 0,
-            R"(__init__(self, bodies, *, gravity=(0, -9.81, 0), obstacles=(), pins=(), forces=(), hands=(), wind=(0, 0, 0), air_density=0.0, air_temperature=293.0, air_heat_transfer=0.0, heat_sources=(), friction=0.3, restitution=0.7, frames_per_second=60.0, mode='auto', most_substeps=256, descent_substeps=4, descent_iterations=8, contacts_between_bodies=True, contacts_within_bodies=True, automatic_rigid=True, threads=0)
+            py::arg("most_substeps") = 500, py::arg("contacts_between_bodies") = true,
+            py::arg("contacts_within_bodies") = true, py::arg("automatic_rigid") = true, py::arg("threads") = 0,
+            R"(__init__(self, bodies, *, gravity=(0, -9.81, 0), obstacles=(), pins=(), forces=(), hands=(), wind=(0, 0, 0), air_density=0.0, air_temperature=293.0, air_heat_transfer=0.0, heat_sources=(), friction=0.3, restitution=0.7, frames_per_second=60.0, mode='auto', most_substeps=500, contacts_between_bodies=True, contacts_within_bodies=True, automatic_rigid=True, threads=0)
 --
 
 )")
@@ -299,7 +295,7 @@ So many frames. When Ctrl-C comes, the frame that was begun is undone.
 Returns
 -------
 dict
-    Of the last frame: 'used' ('explicit' or 'descent'), 'substeps', 'contacts', 'least_volume_ratio' and more.
+    Of the last frame: 'substeps', 'contacts', 'deepest_contact', 'least_volume_ratio' and more.
 
 Warns
 -----

@@ -24,8 +24,7 @@ Error usage(std::string sentence) { return {ErrorCode::usage, std::move(sentence
 Status check_options(const StepOptions& options) {
     if (!(options.frames_per_second > 0 && std::isfinite(options.frames_per_second)))
         return usage("The number of frames a second must be above 0.");
-    if (options.most_substeps == 0 || options.descent_substeps == 0 || options.descent_iterations == 0)
-        return usage("Substeps and iterations are counted from 1.");
+    if (options.most_substeps == 0) return usage("Substeps are counted from 1.");
     return Success{};
 }
 
@@ -104,9 +103,8 @@ public:
         if (const std::size_t cells = body.cells.cells.size(); cells < kFewestElasticCells)
             return "it has only " + std::to_string(cells) + (cells == 1 ? " cell" : " cells");
         const double substeps = substeps_at_rest(state);
-        if (options_.mode != StepMode::automatic || substeps <= kMostElasticSubsteps * options_.most_substeps)
-            return "";
-        return "elastic, it would need " + with_commas(std::uint64_t(substeps)) + " explicit substeps a frame";
+        if (options_.mode != StepMode::automatic || substeps <= options_.most_substeps) return "";
+        return "elastic, it would need " + with_commas(std::uint64_t(substeps)) + " substeps a frame";
     }
     std::shared_ptr<const Body> rigid(const std::shared_ptr<const Body>& body) {
         std::shared_ptr<const Body>& found = made_[body];
@@ -155,7 +153,6 @@ void begin_pieces(SimulationState& state, std::span<const Actor> actors, const R
         for (const std::shared_ptr<const Body>& piece : actors[a].fracture->body->pieces) {
             state.bodies.push_back(begin_body({piece, actors[a].placement}, a, false, context));
             state.bodies.back().is_absent = true;
-            state.bodies.back().elasticity->prepare_blocks();
             find_light_corners(state.bodies.back());
         }
         state.cracks.emplace_back(actors[a].fracture, a, first);
@@ -195,15 +192,11 @@ std::vector<Grip> make_grips(std::span<const Hand> hands, const SimulationState&
     return grips;
 }
 
-bool is_finite(const SimulationState& state) {
-    return std::ranges::all_of(
-        state.bodies, [](const BodyState& body) { return is_finite(body.positions) && is_finite(body.velocities); });
-}
-
-/// One frame, whatever way it takes. Cancelled work leaves the state half done.
-Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, const RunContext& context) {
-    const double from = state.time(), until = double(state.frame + 1) * state.frame_seconds();
-    FrameReport report;
+/// Substeps until the frame ends. What is not finite is held on the way, and the rest of the frame goes on from there;
+/// a state that is lost again and again stays as it is until the next frame. Returns how many particles were held.
+std::size_t step_bodies(SimulationState& state, double from, double until, FrameReport& report,
+                        const RunContext& context) {
+    constexpr int kMostRepairs = 4;
     std::size_t held = 0;
     const auto hold_lost = [&] {
         const std::size_t more = hold_lost_particles(state);
@@ -211,38 +204,26 @@ Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, 
         held += more;
     };
     hold_lost();
-    const bool began_lost = held > 0;
+    for (int repairs = 0; from < until && repairs <= kMostRepairs && !context.is_cancelled(); ++repairs) {
+        from = step_explicitly(state, from, until, report, context);
+        hold_lost();
+    }
+    return held;
+}
+
+/// One frame. Cancelled work leaves the state half done.
+Result<FrameReport> step_frame(SimulationState& state, const RunContext& context) {
+    const double from = state.time(), until = double(state.frame + 1) * state.frame_seconds();
+    FrameReport report;
     state.contacts.clear_touches();
     state.external.find_wind(state.bodies, from, state.options.frames_per_second, context);
-
-    double reached = from;
-    DescentCause cause = DescentCause::chosen;
-    if (state.options.mode != StepMode::descent && began_lost) {
-        cause = DescentCause::not_finite; // the frame began so
-    } else if (state.options.mode != StepMode::descent) {
-        reached = step_explicitly(state, from, until, report, context);
-        cause = DescentCause::too_many_substeps;
-    }
+    std::size_t held = step_bodies(state, from, until, report, context);
     if (context.is_cancelled()) return cancelled_error();
-    if (!is_finite(state)) { // an explicit frame that failed is done again
-        if (Status undone = restore_state(state, start); !undone) return undone.error();
-        hold_lost_particles(state);
-        report = {.elastic_seconds = report.elastic_seconds,
-                  .contact_seconds = report.contact_seconds,
-                  .other_seconds = report.other_seconds};
-        reached = from;
-        cause = DescentCause::not_finite;
-    }
-    if (reached < until) {
-        report.used = StepMode::descent;
-        report.why_descent = cause;
-        step_by_descent(state, reached, until, report, context);
-    }
     state.grid->advance(from, until, report, context);
     for (BodyState& body : state.bodies)
         if (body.is_on_grid) state.grid->read(body.actor, body.positions, body.velocities);
     if (context.is_cancelled()) return cancelled_error();
-    hold_lost();
+    held += hold_lost_particles(state);
     report.clamped_particles += held;
     tell_first_lost(state, report);
     report.most_crushed = state.bodies[report.most_crushed].actor;
@@ -271,7 +252,6 @@ public:
         [[maybe_unused]] const Status undone = restore_state(state_, std::move(start_));
         assert(undone.ok());
     }
-    const SavedState& state() const { return start_; }
     void keep() { is_whole_ = true; }
 
 private:
@@ -315,7 +295,7 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
 Result<FrameReport> Simulation::advance(const RunContext& context) {
     if (context.is_cancelled()) return cancelled_error();
     UnlessWhole start(*state_);
-    Result<FrameReport> report = step_frame(*state_, start.state(), context);
+    Result<FrameReport> report = step_frame(*state_, context);
     if (report) start.keep();
     return report;
 }

@@ -19,36 +19,24 @@ struct Actor {
     bool may_sleep = true;
 };
 
-/// explicit_steps: velocity Verlet, as many substeps as stability asks for; where that is more than 20,000 a frame, or
-/// what comes of it is not finite, descent takes over for the frame, and the report says why. descent: vertex block
-/// descent, a fixed number of implicit substeps. automatic: the first where it takes no more than most_substeps, else
-/// the second. A frame that was begun in the first way may take up to twice as many.
-enum class StepMode { automatic, explicit_steps, descent };
+/// automatic: bodies that would need too many substeps become rigid, StepOptions::automatic_rigid. explicit_steps:
+/// those of 8 cells and more stay elastic, whatever they cost.
+enum class StepMode { automatic, explicit_steps };
 
 struct StepOptions {
     double frames_per_second = 60;
     StepMode mode = StepMode::automatic;
-    /// A descent frame costs as much as some 120 explicit substeps. Where bodies meet so fast that descent needs up to
-    /// 16 times as many of its own, explicit ones may be as many times more.
-    unsigned most_substeps = 256;
-    unsigned descent_substeps = 4, descent_iterations = 8;
     bool contacts_between_bodies = true, contacts_within_bodies = true;
-    /// Whether bodies of fem and springs become rigid that have fewer than kFewestElasticCells cells, or for which
-    /// `automatic` would need more than kMostElasticSubsteps times most_substeps. Those that are pinned stay elastic.
+    /// Whether bodies of fem and springs become rigid that have fewer than kFewestElasticCells cells, or that would
+    /// need more than most_substeps a frame at rest. Those that are pinned, that yield or that break stay elastic.
     bool automatic_rigid = true;
+    unsigned most_substeps = 500;
 };
 inline constexpr std::size_t kFewestElasticCells = 8;
-inline constexpr double kMostElasticSubsteps = 4;
-
-/// Why a frame was made by descent, or finished by it. chosen: the options say so. too_many_substeps: explicit steps
-/// would have been more than the mode allows. not_finite: they did not come to numbers, and the frame was done again.
-enum class DescentCause { none, chosen, too_many_substeps, not_finite };
 
 /// What a frame took and met.
 struct FrameReport {
-    StepMode used = StepMode::explicit_steps;
-    DescentCause why_descent = DescentCause::none;
-    unsigned substeps = 0;
+    unsigned substeps = 0;        ///< of velocity Verlet, as many as stability asked for
     std::size_t contacts = 0;     ///< surface points that touch something, at the frame's end
     double deepest_contact = 0;   ///< m below an obstacle's surface
     double deepest_in_matter = 0; ///< m that a point of a surface lay inside another body, or its own

@@ -22,7 +22,7 @@ struct CheckTotals {
 
 /// Sums over all frames so far. No times: equal runs have equal totals.
 struct RunTotals {
-    std::uint64_t frames = 0, explicit_frames = 0, descent_frames = 0;
+    std::uint64_t frames = 0;
     std::uint64_t substeps = 0, least_substeps = ~std::uint64_t{0}, most_substeps = 0, clamped_particles = 0,
                   most_contacts = 0;
     double deepest_contact = 0, deepest_in_matter = 0; ///< m
@@ -43,20 +43,12 @@ struct RunTimes {
     void add(const FrameReport& report);
 };
 
-/// Frames that descent made or finished, by cause.
-struct DescentCauses {
-    std::uint64_t chosen = 0, too_many_substeps = 0, not_finite = 0;
-
-    void add(const FrameReport& report);
-};
-
 struct Recording {
     std::vector<PoseSequence> poses;                        ///< one a body; the first is the start
     std::vector<std::vector<std::vector<Vec3f>>> particles; ///< of each body and frame, where they are drawn
     std::vector<std::vector<MatterParticles>> matter;       ///< of each body and frame; none of bodies not of mpm
     std::vector<CheckTotals> checks;                        ///< one a body where that was asked for, else none
     RunTotals totals;
-    DescentCauses descent_causes;
     std::vector<BodyDoubts> doubts; ///< one a body
     std::optional<FirstLoss> first_loss;
     EnergyWatch energy;

@@ -15,8 +15,8 @@ namespace {
 constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTAT8"; // ends in the version
 
 void write_totals(ByteWriter& out, const RunTotals& t) {
-    for (const std::uint64_t count : {t.frames, t.explicit_frames, t.descent_frames, t.substeps, t.least_substeps,
-                                      t.most_substeps, t.clamped_particles, t.most_contacts})
+    for (const std::uint64_t count :
+         {t.frames, t.substeps, t.least_substeps, t.most_substeps, t.clamped_particles, t.most_contacts})
         out.value(count);
     out.value(t.deepest_contact);
     out.value(t.deepest_in_matter);
@@ -27,8 +27,8 @@ void write_totals(ByteWriter& out, const RunTotals& t) {
 
 RunTotals read_totals(ByteReader& in) {
     RunTotals t;
-    for (std::uint64_t* count : {&t.frames, &t.explicit_frames, &t.descent_frames, &t.substeps, &t.least_substeps,
-                                 &t.most_substeps, &t.clamped_particles, &t.most_contacts})
+    for (std::uint64_t* count :
+         {&t.frames, &t.substeps, &t.least_substeps, &t.most_substeps, &t.clamped_particles, &t.most_contacts})
         *count = in.value<std::uint64_t>();
     t.deepest_contact = in.value<double>();
     t.deepest_in_matter = in.value<double>();
@@ -69,8 +69,6 @@ EnergyWatch read_energy(ByteReader& in) {
 }
 
 void write_doubts(ByteWriter& out, const Recording& recording) {
-    const DescentCauses& causes = recording.descent_causes;
-    for (const std::uint64_t count : {causes.chosen, causes.too_many_substeps, causes.not_finite}) out.value(count);
     for (const BodyDoubts& body : recording.doubts) {
         const Inversion inversion = body.inversion.value_or(Inversion{});
         out.value(std::uint64_t(body.first_lost.has_value()) + 2 * std::uint64_t(body.inversion.has_value()));
@@ -89,9 +87,6 @@ void write_doubts(ByteWriter& out, const Recording& recording) {
 }
 
 void read_doubts(ByteReader& in, std::size_t bodies, Recording& recording) {
-    DescentCauses& causes = recording.descent_causes;
-    for (std::uint64_t* count : {&causes.chosen, &causes.too_many_substeps, &causes.not_finite})
-        *count = in.value<std::uint64_t>();
     for (std::size_t b = 0; b < bodies; ++b) {
         const auto flags = in.value<std::uint64_t>();
         const auto first_lost = in.value<std::uint64_t>();

@@ -197,8 +197,6 @@ private:
         }
         step.mode = static_cast<StepMode>(in.word("mode", 0));
         in.set_whole("most_substeps", step.most_substeps);
-        in.set_whole("descent_substeps", step.descent_substeps);
-        in.set_whole("descent_iterations", step.descent_iterations);
         step.contacts_between_bodies = in.flag("contacts_between_bodies", true);
         step.contacts_within_bodies = in.flag("contacts_within_bodies", true);
         step.automatic_rigid = in.flag("automatic_rigid", true);

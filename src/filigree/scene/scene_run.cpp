@@ -125,7 +125,6 @@ Status SceneRun::advance_to(std::uint64_t last, const RunContext& context) {
         if (!report) return report.error();
         recording_.totals.add(*report);
         times_.add(*report);
-        recording_.descent_causes.add(*report);
         note_doubts(*report);
         for (std::size_t b = 0; b < followers_.size(); ++b)
             if (const Status recorded = record_body(b); !recorded) return recorded;
@@ -268,7 +267,6 @@ std::vector<std::string> SceneRun::warnings() const {
         add(inversion_warning(b));
     }
     add(energy_warning());
-    if (const std::optional<std::string> descent = descent_warning()) sentences.push_back(*descent);
     return sentences;
 }
 
@@ -333,22 +331,6 @@ std::optional<std::string> SceneRun::broke_down() const {
     if (what.empty()) return std::nullopt;
     return fmt::format("{}: {}, so the result is not to be trusted; the warnings say where, and what to change.",
                        scene_->path, fmt::join(what, ", "));
-}
-
-/// Descent has a damping of its own, which takes the place of what the scene asks for.
-std::optional<std::string> SceneRun::descent_warning() const {
-    const bool is_deadened = std::any_of(scene_->bodies.begin(), scene_->bodies.end(),
-                                         [](const SceneBody& body) { return body.material.internal_damping > 0; });
-    const bool is_springy = std::any_of(scene_->obstacles.begin(), scene_->obstacles.end(),
-                                        [](const SceneObstacle& obstacle) { return obstacle.sets_restitution; });
-    const std::uint64_t frames = recording_.totals.descent_frames;
-    if (frames == 0 || !(is_deadened || is_springy)) return std::nullopt;
-    const char* replaced = !is_springy    ? "internal_damping"
-                           : !is_deadened ? "restitution"
-                                          : "internal_damping and restitution";
-    return fmt::format("{} frames were computed by descent, whose own damping takes the place of {}; mode = "
-                       "\"explicit\" heeds {}",
-                       with_commas(frames), replaced, is_deadened && is_springy ? "them" : "it");
 }
 
 } // namespace filigree

@@ -30,7 +30,6 @@ public:
     std::uint64_t frame() const { return recording_.totals.frames; }
     const Recording& recording() const { return recording_; }
     const RunTimes& times() const { return times_; }
-    const DescentCauses& descent_causes() const { return recording_.descent_causes; }
     FractureReport fracture(std::size_t body) const { return simulation_.fracture(body); }
     Energy energy() const { return simulation_.energy(always_); }
     /// The body's mesh in one of the recorded poses, at the scene's origin. Errors: as of Restorer::mesh.
@@ -66,7 +65,6 @@ private:
     std::string inversion_warning(std::size_t body) const;
     std::string loss_warning() const;
     std::string energy_warning() const;
-    std::optional<std::string> descent_warning() const;
 
     const SceneFile* scene_;
     const ReadyScene* ready_;

@@ -7,8 +7,6 @@
 
 namespace filigree {
 
-void Elasticity::prepare_blocks() {}
-void Elasticity::add_block(Index, const Vectors&, Vec3f&, Symmetric3&) const {}
 void Elasticity::finish_substep(const Vectors&, float, const RunContext&) {}
 bool Elasticity::wants_renewal() const { return false; }
 void Elasticity::renew(const Vectors&, const RunContext&) {}

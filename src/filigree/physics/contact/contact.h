@@ -54,12 +54,6 @@ public:
     }
     /// s: in longer steps something could pass through something.
     double longest_step() const { return matter_.longest_step(); }
-    /// The same before anything is searched for, of all that is found anew: before a substep of descent.
-    double longest_step_from(std::span<const BodyState> bodies, double left, const RunContext& context) {
-        near_until_ = pairs_until_ = -1;
-        matter_.find_approaching(bodies, left, context);
-        return matter_.longest_step();
-    }
     /// The next search finds everything again, and ways are counted from here; anchors and touches stay.
     void begin_anew() {
         near_until_ = pairs_until_ = -1;
@@ -77,7 +71,7 @@ public:
     ContactReport add_forces(std::span<BodyState> bodies, double time, float dt, const RunContext& context);
 
     /// Moves what is deeper than a part of the spacing out, and takes its speed inwards away: for impacts faster than
-    /// the penalty can stop. Looks at what the last add_forces or update_anchors found.
+    /// the penalty can stop. Looks at what the last add_forces found.
     void push_out(std::span<BodyState> bodies, double time, const RunContext& context);
 
     /// Whether friction holds a body's surface on an obstacle.
@@ -92,72 +86,6 @@ public:
             if (pair.grasp.holds && pair.first_body != pair.second_body) visit(pair.first_body, pair.second_body);
     }
 
-    /// What bodies meet in a substep of descent, worked out once for all of them.
-    struct Meetings {
-        ObstaclePoses poses; ///< where the substep ends
-        std::vector<MatterContacts::Frame> frames;
-        /// Of each body, ascending: twice the number of a frame, or of a pair of balls, and 1 for its second body.
-        IndexLists frames_of, pairs_of;
-    };
-    /// Searches; search.time, dt: of the substep's end, and its length. Sleepers that something is about to touch wake.
-    Meetings meetings(std::span<BodyState> bodies, const Search& search, float dt, const RunContext& context);
-
-    /// Contacts of one body as blocks for vertex block descent. Valid as long as the meetings, and until the next
-    /// search.
-    class Blocks final : public BlockTerms {
-    public:
-        /// Before every sweep: takes the points' places. During the sweep add sees each move by the asking particle
-        /// alone, so that nothing depends on which thread moves the others when.
-        /// swept: what `add` will be asked with; it moves `scale` times as far as the particles' positions.
-        void update_places(std::span<const BodyState> bodies, const Vectors& swept, float scale);
-        void add(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const override;
-        /// A further spring that pulls points of an embedding: a hand.
-        void add_pull(const Embedding& points, std::size_t point, const Vec3f& target, float stiffness);
-        std::span<const std::uint8_t> touched() const { return touched_; }
-        bool
-        holds() const; ///< whether friction holds something of the body, so that it touched when the substep begins
-
-    private:
-        friend class Contacts;
-        struct Entry {
-            const Embedding* embedding = nullptr; ///< the point that touches
-            Index point = 0;
-            float stiffness = 0;
-            const Obstacle* obstacle = nullptr;
-            const Eigen::Isometry3d* motion = nullptr; ///< of the obstacle
-            bool anchored = false;
-            Vec3f anchor = Vec3f::Zero(); ///< world
-            float friction = 0, unloading = 1;
-            const MatterContacts::Frame* frame = nullptr; ///< or a point and the matter around it; `place` is its way
-            const BodyState* other = nullptr;             ///< or a ball, of another body or of far matter of the same
-            const Embedding* other_embedding = nullptr;
-            Index other_point = 0;
-            float reach = 0;              ///< sum of the balls' radii
-            bool rubs = false;            ///< not a push but friction, between the surface's points over two balls
-            Vec3f normal = Vec3f::Zero(); ///< of what rubs
-            Vec3f target = Vec3f::Zero(); ///< of what rubs: from the other's point; else of a pull: in the world
-            float limit = 0;              ///< N, most friction
-            Vec3f place = Vec3f::Zero(), other_place = Vec3f::Zero(); ///< of the points, by update_places
-        };
-        template <class Visit>
-        void each_weight(const Entry& entry, const Visit& visit) const;
-        void link(std::size_t particles);
-        std::size_t body_ = 0;
-        const MatterContacts* matter_ = nullptr;
-        std::vector<Entry> entries_;
-        Vectors start_; ///< what is swept, at the last update_places
-        float scale_ = 1;
-        std::vector<std::uint8_t> touched_;
-        std::vector<Index> offsets_, entry_of_; ///< entries of each particle
-        std::vector<float> weight_of_;
-    };
-    /// `pulls` adds hands before the particles are linked. Cost O(the body's contacts and particles).
-    Blocks blocks(std::span<const BodyState> bodies, std::size_t body, const Meetings& met, float dt,
-                  const std::function<void(Blocks&)>& pulls) const;
-    /// After a descent substep: anchors begin, slide and end as positions say.
-    /// start: each body's positions before the substep.
-    ContactReport update_anchors(std::span<const BodyState> bodies, std::span<const Vectors> start, double time);
-
     /// What the last add_forces may have added to the squared frequency of a body, in parts of that at rest. Two bodies
     /// that push each other swing by the sum of what each feels.
     double added_frequency(std::size_t body) const {
@@ -167,9 +95,6 @@ public:
                                                        : 0.0;
         return double(kContactShare) * ((touched & kOnObstacle ? 1.0 : 0.0) + 2 * in_matter);
     }
-    /// Joins bodies that touch each other: a group that touches nothing else keeps its momentum. is_held: 1 is set of
-    /// those that touch an obstacle.
-    void join_touching(DisjointSets& groups, std::span<std::uint8_t> is_held) const;
 
     /// A surface point near an obstacle, and where friction holds it in the obstacle's own axes.
     struct NearMemory {
@@ -228,9 +153,6 @@ private:
     struct PairForce {
         Vec3f push = Vec3f::Zero(), friction = Vec3f::Zero();
     };
-    Blocks::Entry block_of(const Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const;
-    void add_blocks_of(const NearPair& pair, std::span<const BodyState> bodies, bool of_first, float dt,
-                       std::vector<Blocks::Entry>& entries) const;
     ContactReport add_obstacle_forces(BodyState& body, std::size_t b, const ObstaclePoses& poses, float dt,
                                       std::vector<Vec3f>& forces, const RunContext& context);
     Vec3f obstacle_force(Near& at, float& clear_until, const BodyState& body, const ObstaclePoses& poses,

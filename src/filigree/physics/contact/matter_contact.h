@@ -68,16 +68,6 @@ public:
     /// bodies that something touches wake; returns whether any did. frame: s, for about so long
     /// what is found is to hold.
     bool search(std::span<BodyState> bodies, double frame, const RunContext& context);
-    /// Begins anew, and finds only which bodies are near each other, for longest_step.
-    void find_approaching(std::span<const BodyState> bodies, double frame, const RunContext& context);
-    /// Calls visit(body, other) for each two different bodies of which points touched at last.
-    template <class Visit>
-    void each_touching(const Visit& visit) const {
-        for (const Side& side : sides_)
-            if (side.body != side.other &&
-                std::ranges::any_of(side.pairs, [](const Pair& pair) { return pair.depth > 0; }))
-                visit(side.body, side.other);
-    }
     /// The same of those that friction holds together.
     template <class Visit>
     void each_holding(const Visit& visit) const {
@@ -131,24 +121,8 @@ public:
     bool is_sound(const Memory& memory, std::span<const BodyState> bodies) const;
     void set_memory(const Memory& memory, std::span<const BodyState> bodies);
 
-    /// A pair as descent sees it in a substep: the matter's frame stands still.
-    struct Frame {
-        Index body, other, point;
-        Matter::Place place;
-        Vec3f normal = Vec3f::Zero();
-        Vec3f start = Vec3f::Zero(); ///< from the point to the matter at its place, before anything moves
-        float depth = 0;             ///< then; below 0 outside
-        float stiffness = 0, unloading = 1, friction = 0;
-        bool holds = false;
-        Vec3f offset = Vec3f::Zero(); ///< from the anchor, along the surface, then
-    };
-    std::vector<Frame> frames(std::span<const BodyState> bodies, float dt) const;
-    /// Sleepers wake that something is about to touch. Returns whether any did.
-    bool wake_met(std::span<BodyState> bodies, std::span<const Frame> frames) const;
     const Matter& matter(std::size_t body) const { return *matter_[body]; }
     const PairLaws& laws() const { return laws_; }
-    /// After a descent substep: what touches, and friction's anchors, as positions say.
-    ContactReport update_anchors(std::span<const BodyState> bodies, std::span<std::uint8_t> touched);
 
 private:
     /// Points of one body against the matter of another, or of its own.
@@ -242,7 +216,7 @@ private:
         float depth = 0;
     };
     std::vector<PairForce> forces_; ///< of work_
-    bool is_too_deep_ = false; ///< something touches deeper than push_out lets it, as add_forces or update_anchors saw
+    bool is_too_deep_ = false;      ///< something touches deeper than push_out lets it, as add_forces saw
 };
 
 } // namespace filigree

@@ -1,4 +1,4 @@
-// Contacts in matter: forces in explicit steps, moving out what is too deep; frames and anchors in descent.
+// Contacts in matter: forces, and moving out what is too deep.
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/contact/cell_boxes.h"
 #include "filigree/physics/contact/matter_contact.h"
@@ -206,82 +206,6 @@ void MatterContacts::push_out(Pair& pair, const Side& side, std::span<BodyState>
     for (Index k = body.surface.offsets[pair.point]; k < body.surface.offsets[pair.point + 1]; ++k)
         push_particle(body, body.surface.particles[k], body.surface.weights[k], way, push);
     for (int c = 0; c < 8; ++c) push_particle(other, corners[c], -weights[c], way, push);
-}
-
-std::vector<MatterContacts::Frame> MatterContacts::frames(std::span<const BodyState> bodies, float dt) const {
-    std::vector<Frame> frames;
-    for (const Side& side : sides_)
-        for (Pair pair : side.pairs) {
-            const BodyState &body = bodies[side.body], &other = bodies[side.other];
-            const Matter& matter = *matter_[side.other];
-            std::optional<Vec3f> normal = enter(pair, side, bodies);
-            float depth = pair.depth;
-            const Vec3f velocity =
-                embedded_point(body.surface, pair.point, body.velocities) - matter.mean(pair.place, other.velocities);
-            if (!normal) { // what is outside may touch before the substep ends
-                if (pair.tangled || pair.clear_until > side.way + kMostReach * side.spacing) continue;
-                if (side.body == side.other && matter.are_together(matter.cell_of_point(pair.point), pair.place.cell))
-                    continue;
-            }
-            // The surface that is nearest when the substep ends: a point that comes in just behind an edge would run
-            // against the face that it is about to pass.
-            const Mat3f inverse = matter.inverse_derivative(other.positions, pair.place);
-            const Vec3f way = dt * velocity;
-            Matter::Place then = pair.place;
-            then.local += inverse * way;
-            const std::optional<Matter::Depth> found = matter.depth(then, inverse, pair.entry);
-            if (found && found->normal.allFinite() && (!normal || found->depth > 0)) {
-                depth = found->depth + way.dot(found->normal);
-                if (!normal) depth = std::min(0.0f, depth);
-                normal = found->normal;
-            }
-            if (!normal) continue;
-            Frame& frame = frames.emplace_back();
-            frame.body = side.body;
-            frame.other = side.other;
-            frame.point = pair.point;
-            frame.place = pair.place;
-            frame.normal = *normal;
-            frame.start =
-                matter.mean(pair.place, other.positions) - embedded_point(body.surface, pair.point, body.positions);
-            frame.depth = depth;
-            frame.stiffness = stiffness(side, pair, bodies);
-            frame.unloading = unloading(side.law.restitution, velocity.dot(*normal), smooth_speed(world_, dt));
-            frame.friction = float(side.law.friction);
-            frame.holds = pair.grasp.holds;
-            if (frame.holds)
-                frame.offset = along_surface(
-                    matter.mean(pair.place, other.positions) - matter.mean(pair.anchor, other.positions), frame.normal);
-        }
-    return frames;
-}
-
-ContactReport MatterContacts::update_anchors(std::span<const BodyState> bodies, std::span<std::uint8_t> touched) {
-    ContactReport report;
-    is_too_deep_ = false;
-    for (Side& side : sides_)
-        for (Pair& pair : side.pairs) {
-            const std::optional<Vec3f> normal = enter(pair, side, bodies);
-            if (!normal) continue;
-            const BodyState& other = bodies[side.other];
-            const Matter& matter = *matter_[side.other];
-            touched[side.body] |= touch_of(side);
-            touched[side.other] |= touch_of(side);
-            ++report.contacts;
-            report.deepest_in_matter = std::max(report.deepest_in_matter, pair.depth);
-            is_too_deep_ |= pair.depth > most_depth(side);
-            const bool landed = !pair.grasp.holds;
-            Vec3f offset = Vec3f::Zero();
-            if (!landed)
-                offset = along_surface(
-                    matter.mean(pair.place, other.positions) - matter.mean(pair.anchor, other.positions), *normal);
-            const float limit = float(side.law.friction) * pair.depth;
-            const float stretch = kTangentialStiffness * offset.norm();
-            pair.grasp = {true, stretch > limit};
-            if (stretch > limit) offset *= limit / stretch;
-            if (landed || pair.grasp.slides) anchor_at(pair, side, other, offset);
-        }
-    return report;
 }
 
 } // namespace filigree

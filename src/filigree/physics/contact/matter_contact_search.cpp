@@ -295,12 +295,6 @@ MatterContacts::Side MatterContacts::make_side(Index body, Index other, std::spa
     return side;
 }
 
-void MatterContacts::find_approaching(std::span<const BodyState> bodies, double frame, const RunContext& context) {
-    begin_anew();
-    begin_frame(bodies, context);
-    find_sides(bodies, frame, context);
-}
-
 /// Pairs of a side anew, and its way counts from here; those that touch stay. find(s): what point s is near.
 template <class Find>
 void MatterContacts::take_pairs(Side& side, const BodyState& body, std::size_t points, const Find& find) {
@@ -326,17 +320,6 @@ void MatterContacts::take_pairs(Side& side, const BodyState& body, std::size_t p
 /// Of those that touch a sleeper: whatever came to it or moves. One that rests beside it has gone to rest with it.
 bool MatterContacts::disturbs(const BodyState& body, std::size_t number) const {
     return !body.sleeps() && (!body.rigid || !body.rigid->rests || speed(number) > kSlow);
-}
-
-bool MatterContacts::wake_met(std::span<BodyState> bodies, std::span<const Frame> frames) const {
-    bool woke = false;
-    for (const Frame& frame : frames)
-        for (const auto& [sleeper, other] : {std::pair(frame.body, frame.other), std::pair(frame.other, frame.body)}) {
-            if (bodies[sleeper].is_absent || !bodies[sleeper].sleeps() || !disturbs(bodies[other], other)) continue;
-            wake(bodies[sleeper]);
-            woke = true;
-        }
-    return woke;
 }
 
 /// A body that sleeps wakes when one that touches it disturbs it.

@@ -1,4 +1,4 @@
-// The inner loops of the fem material: elastic forces of whole cells and sweeps of vertex block descent, sixteen (or
+// The inner loops of the fem material: elastic forces of whole cells, sixteen (or
 // eight, or four) cells at a time.
 #pragma once
 
@@ -38,19 +38,6 @@ struct Slab {
     std::size_t first_layer, last_layer; ///< of corners, both included
 };
 
-/// Corners beside each other along x, as many as there are without a gap: what a sweep moves at a time.
-struct Row {
-    Index first_corner, count;
-    bool odd_start;                              ///< parity of the first corner's lattice x
-    std::size_t first_neighbour, last_neighbour; ///< [first, last) of Plan::neighbours
-};
-
-/// A run with corners in a row: which of its four rows that is, and where in the row the run starts.
-struct Neighbour {
-    Index run, offset;
-    std::uint8_t side; ///< index into Run::rows
-};
-
 /// Everything about a body that the loops want and that does not change.
 struct Plan {
     const Cells* cells = nullptr;
@@ -59,10 +46,6 @@ struct Plan {
     std::vector<std::size_t> layer_starts; ///< first corner of each layer; one more at the end
     std::vector<std::size_t> run_layers;   ///< of each run's lower corners
     std::vector<Slab> slabs;
-    std::vector<Row> rows;
-    std::vector<Neighbour> neighbours;
-    std::array<std::vector<Index>, 4> row_colors; ///< rows by the parities of their j and k
-    std::size_t longest_row = 0;
 };
 Plan make_plan(const Body& body);
 
@@ -76,14 +59,10 @@ struct Sums {
 ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces, Sums& sums,
                      const RunContext& context);
 
-/// Elasticity::sweep, in the same order on any processor.
-void sweep(const Plan& plan, Vectors& positions, const Descent& descent, const RunContext& context);
-
-/// Cells at a time that this processor has an implementation for, ascending; forces and sweep take the fastest.
+/// Cells at a time that this processor has an implementation for, ascending; forces takes the fastest.
 std::span<const int> lane_counts();
 /// The same by one of them, so that tests can hold them against each other.
 ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces, Sums& sums, int lanes,
                      const RunContext& context);
-void sweep(const Plan& plan, Vectors& positions, const Descent& descent, int lanes, const RunContext& context);
 
 } // namespace filigree::cell_kernel

@@ -7,7 +7,6 @@
 #include "filigree/physics/body.h"
 #include "filigree/physics/fem/cell_kernel.h"
 #include "filigree/physics/fem/plastic_cells.h"
-#include "filigree/physics/fem/vertex_block.h"
 #include "filigree/physics/step/byte_stream.h"
 
 #include <algorithm>
@@ -19,14 +18,6 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kPlasticGrain = 256;
-
-/// +1 or -1 of a corner in a sum.
-float sign_of(int corner, int sum) {
-    float sign = 1;
-    for (int bit = 1; bit < 8; bit *= 2)
-        if (sum & bit && !(corner & bit)) sign = -sign;
-    return sign;
-}
 
 /// What the energy of a cell depends on, by its elastic sums.
 struct ElasticShape {
@@ -78,10 +69,6 @@ public:
         for (auto& around : cells_at_) around.fill(kNoIndex);
         for (Index cell = 0; cell < cells.cells.size(); ++cell)
             for (int corner = 0; corner < 8; ++corner) cells_at_[cells.cell_corners[cell][corner]][corner] = cell;
-        for (Index corner = 0; corner < cells.corners.size(); ++corner) {
-            const auto& at = cells.corners[corner];
-            colors_[(at[0] & 1) + 2 * (at[1] & 1) + 4 * (at[2] & 1)].push_back(corner);
-        }
     }
 
     ElasticReport forces(const Vectors& positions, Vectors& forces, const RunContext& context) override {
@@ -102,20 +89,6 @@ public:
         ElasticReport all{0, std::numeric_limits<float>::infinity(), 0};
         for (const ElasticReport& report : found) take_worse(all, report);
         return all;
-    }
-
-    /// Corners whose places have the same parities share no cell.
-    void sweep(Vectors& positions, const Descent& descent, const RunContext& context) override {
-        for (const std::vector<Index>& color : colors_)
-            parallel_for(context, color.size(), kPlasticGrain / 4, [&](std::size_t begin, std::size_t end) {
-                for (std::size_t n = begin; n < end; ++n) move_corner(positions, descent, color[n]);
-            });
-    }
-
-    void add_block(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const override {
-        for (int side = 0; side < 8; ++side)
-            if (const Index cell = cells_at_[particle][side]; cell != kNoIndex)
-                add_cell(cell, side, positions, force, block);
     }
 
     double energy(const Vectors& positions, const RunContext& context) const override {
@@ -213,41 +186,6 @@ private:
                             std::sqrt(I / 3)});
     }
 
-    /// Adds one cell's force on one of its corners, and the block there.
-    void add_cell(Index cell, int corner, const Vectors& positions, Vec3f& force, Symmetric3& block) const {
-        const ElasticShape shape = shape_of(cell, positions);
-        const PlasticCell& plastic = plastic_[cell];
-        const Vec3f signs(sign_of(corner, 1), sign_of(corner, 2), sign_of(corner, 4));
-        const Vec3f elastic_signs = plastic.inverse.transpose() * signs;
-        float squares = 0;
-        Vec3f by_I = Vec3f::Zero(), by_J = Vec3f::Zero(); // half of dI/dx; dJ/dx
-        const auto add = [&](int sum, float sign) {
-            squares += kSumShares[sum] * sign * sign / (size_ * size_);
-            by_I += kSumShares[sum] * sign / (size_ * size_) * shape.X[sum];
-        };
-        for (int a = 0; a < 3; ++a) {
-            add(kLinearSums[a], elastic_signs[a]);
-            by_J += elastic_signs[a] / (size_ * size_ * size_) * shape.cofactors.col(a);
-        }
-        for (int b = 0; b < 4; ++b) add(kBentSums[b], sign_of(corner, kBentSums[b]) - signs.dot(plastic.bent[b]));
-        const float I = shape.linear + shape.bent, h = material_.spacing;
-        const float volume = body_.cells.fraction[cell] * h * h * h, shear = material_.shear * I / (I + 1);
-        force -= volume * (shear * by_I + material_.bulk * (shape.J - material_.rest_ratio) * by_J);
-        block.add_scaled_identity(volume * shear * squares);
-        block.add_outer(by_I, volume * 2 * material_.shear / ((I + 1) * (I + 1)));
-        block.add_outer(by_J, volume * material_.bulk);
-    }
-
-    void move_corner(Vectors& positions, const Descent& descent, Index corner) const {
-        if (descent.fixed[corner]) return;
-        Vec3f force = descent.inertia[corner] * (descent.target[corner] - positions[corner]);
-        Symmetric3 block;
-        block.add_scaled_identity(descent.inertia[corner]);
-        add_block(corner, positions, force, block);
-        if (descent.touched[corner] && descent.external) descent.external->add(corner, positions, force, block);
-        positions.add(corner, block.solve(force));
-    }
-
     double energy_of(std::size_t cell, const Vectors& positions) const {
         const CellSums X = plastic_[cell].elastic(cell_sums(positions, body_.cells.cell_corners[cell]));
         const double size = double(size_), h = double(material_.spacing), g = double(material_.rest_ratio);
@@ -263,7 +201,6 @@ private:
     const cell_kernel::CellMaterial material_;
     const float size_;                           ///< m: 4 h
     std::vector<std::array<Index, 8>> cells_at_; ///< of each corner, the cell in which it is the n-th
-    std::array<std::vector<Index>, 8> colors_;   ///< corners by the parities of their places
     std::vector<PlasticCell> plastic_;           ///< state
     std::vector<std::array<Vec3f, 8>> pushes_;   ///< scratch: N, of each cell on its corners
 };

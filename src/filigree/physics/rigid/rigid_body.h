@@ -33,10 +33,6 @@ void drift_rigid(BodyState& body, double dt);
 /// N/m of each surface point, so that those that touch at one time add no more than kRigidSquaredFrequency.
 std::vector<float> rigid_surface_stiffness(const BodyState& body);
 
-/// One Newton step of the six ways in which a body moves without deforming [Giles 2025]: all of a sweep for a rigid
-/// body; for others what sweeps from particle to particle are slow at.
-void move_as_one(Vectors& positions, std::span<const float> mass, const Descent& descent);
-
 /// Elastic forces of a body that has none.
 std::unique_ptr<Elasticity> make_rigid_elasticity(const Body& body);
 

@@ -15,7 +15,6 @@
 // Particles side by side along x share a stencil, and lanes are particles: the same sums in any vector width.
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/body/elasticity.h"
-#include "filigree/physics/fem/vertex_block.h"
 #include "filigree/physics/springs/spring_kernel.h"
 
 #include <algorithm>
@@ -33,11 +32,6 @@ namespace {
 // unit of J, just below 0; there this pushes out by 0.45 E. Random and collapsed starts came back with 1.5 and with 3,
 // and no longer with 12, where the tetrahedra of corners wedge each other fast.
 constexpr float kVolumeFrom = 0.3f, kVolumeStiffness = 1.5f;
-constexpr float kVolumeNear =
-    0.6f; // a sweep looks at cells below this at its start: one sweep will not take others there
-// Growing out of a collapse by leaps leaves particles on the wrong side of each other.
-constexpr float kCollapsedSpring = 0.5f;            // squared lengths over those at rest
-constexpr float kCollapsedSpringStep = 0.1f;        // spacings a sweep
 constexpr float kLargestSpring = 1e15f;             // m: positions beyond are not fit for explicit steps
 constexpr std::size_t kSpringElasticityGrain = 256; // particles
 constexpr std::size_t kRunGrain = 2;
@@ -87,13 +81,6 @@ public:
         for (std::size_t c = 0; c < body.cells.cells.size(); ++c)
             for (std::size_t corner = 0; corner < 8; ++corner)
                 cells_at_[body.cells.cell_corners[c][corner]][corner] = Index(c);
-        // Bending springs reach two steps far, so particles three apart are independent.
-        colors_.resize(27);
-        for (std::size_t i = 0; i < n; ++i) {
-            const Cells::LatticeIndex& at = body.cells.corners[i];
-            colors_[std::size_t(at[0] % 3 + 3 * (at[1] % 3) + 9 * (at[2] % 3))].push_back(Index(i));
-        }
-        std::erase_if(colors_, [](const std::vector<Index>& color) { return color.empty(); });
         bounds_.resize(runs_.runs.size());
         volumes_ = volumes_of_cells();
     }
@@ -109,14 +96,6 @@ public:
         if (volumes_.any_pressed) report.squared_frequency += add_volume_forces(positions, forces, context);
         if (!(report.most_stretch < kLargestSpring)) report.squared_frequency = std::numeric_limits<float>::infinity();
         return report;
-    }
-
-    void sweep(Vectors& positions, const Descent& descent, const RunContext& context) override {
-        find_pressed_cells(positions, volumes_, context);
-        for (const std::vector<Index>& color : colors_)
-            parallel_for(context, color.size(), kSpringElasticityGrain / 4, [&](std::size_t begin, std::size_t end) {
-                for (std::size_t k = begin; k < end; ++k) move_particle(positions, descent, color[k]);
-            });
     }
 
     double energy(const Vectors& positions, const RunContext& context) const override {
@@ -214,44 +193,6 @@ private:
         return most;
     }
 
-    void move_particle(Vectors& positions, const Descent& descent, Index i) const {
-        if (descent.fixed[i]) return;
-        const Vec3f x = positions[i];
-        const float inertia = descent.inertia[i];
-        Vec3f force = inertia * (descent.target[i] - x);
-        Symmetric3 block;
-        block.add_scaled_identity(inertia);
-        const Star& star = stars_[i];
-        float lengths = 0, rests = 0; // squared
-        for (std::size_t s = 0; s < kStencil; ++s) {
-            if (star.other[s] == kNoIndex) continue;
-            Vec3f d = positions[star.other[s]] - x;
-            float squared = d.squaredNorm();
-            if (squared < steps_[s].least_squared) {
-                d = steps_[s].least;
-                squared = steps_[s].least_squared;
-            }
-            lengths += squared;
-            rests += steps_[s].rest * steps_[s].rest;
-            const float k = star.stiffness[s], across = 1 - steps_[s].rest / std::sqrt(squared);
-            force += k * across * d;
-            const float a = std::max(0.f, across);
-            block.add_scaled_identity(k * a);
-            block.add_outer(d, k * (1 - a) / squared);
-        }
-        for_pressed_corners(positions, volumes_, i, kVolumeNear,
-                            [&](const CornerVolume& volume, std::size_t axis, float stiffness) {
-                                const Vec3f g = volume_gradient(volume, axis, inverse_cube_);
-                                force -= stiffness * (volume.ratio - kVolumeFrom) * g;
-                                block.add_outer(g, stiffness);
-                            });
-        if (descent.touched[i] && descent.external) descent.external->add(i, positions, force, block);
-        Vec3f step = block.solve(force);
-        const float most = kCollapsedSpringStep * float(body_.spacing()), length = step.norm();
-        if (length > most && lengths < kCollapsedSpring * rests) step *= most / length;
-        positions.add(i, step);
-    }
-
     /// Half of its springs' energy, and that of the cells' corners that it is.
     double star_energy(const Vectors& positions, const CellVolumes& volumes, std::size_t i) const {
         double sum = 0;
@@ -276,8 +217,7 @@ private:
     std::array<Step, kStencil> steps_;
     std::vector<float> inverse_mass_;            // padded
     std::vector<std::array<Index, 8>> cells_at_; // cells around each particle, by which of their corners it is
-    std::vector<std::vector<Index>> colors_;
-    float inverse_cube_, volume_stiffness_; // 1 / h^3; kVolumeStiffness E h^3 / 8
+    float inverse_cube_, volume_stiffness_;      // 1 / h^3; kVolumeStiffness E h^3 / 8
     Kernels kernels_ = widest_kernels();
 
     // Scratch.

@@ -32,10 +32,12 @@ constexpr float kCrushedVolume = 0.1f; ///< of a cell, of its volume at rest
 constexpr float kCrushedDelay = 0.1f;  ///< substeps
 /// Clay that is thrown at the ground would throw bits off, but for damping of waves of a few spacings [von Neumann
 /// 1950].
-constexpr float kFlowingDelay = 0.25f;     ///< of the time that a wave takes across a spacing
-constexpr float kLightDelay = 0.5f;        ///< substeps: of a piece's light corners, which would swing for ever ...
-constexpr float kFreeWay = 0.05f;          ///< spacings a substep: ... as far as they move faster
-constexpr unsigned kExplicitLimit = 20000; ///< substeps a frame, whatever was asked for
+constexpr float kFlowingDelay = 0.25f;    ///< of the time that a wave takes across a spacing
+constexpr float kLightDelay = 0.5f;       ///< substeps: of a piece's light corners, which would swing for ever ...
+constexpr float kFreeWay = 0.05f;         ///< spacings a substep: ... as far as they move faster
+constexpr double kMostDeforming = 0.5;    ///< spacings a substep, between particles of one body
+constexpr unsigned kMostSubsteps = 20000; ///< a frame
+constexpr double kUsualSubsteps = 256;    ///< a frame: what the first forces of a frame take for the step before
 
 /// Where internal damping has forces computed: f(x + tau v) = f(x) - tau K v, Kelvin-Voigt to first order; of v less
 /// its rigid part.
@@ -118,6 +120,22 @@ double stable_step(double squared_frequency, double internal_damping) {
     return std::isfinite(squared_frequency) ? step : 0;
 }
 
+/// s, in which no two particles of the body move further than a part of the spacing beside each other: forces follow
+/// larger steps in no way, however stable they are near rest.
+double deforming_step(const BodyState& body) {
+    const auto spread = [](const std::vector<float>& v, std::size_t count) {
+        float least = v[0], most = v[0];
+        for (std::size_t i = 1; i < count; ++i) {
+            least = v[i] < least ? v[i] : least;
+            most = v[i] > most ? v[i] : most;
+        }
+        return double(most - least);
+    };
+    const Vectors& v = body.velocities;
+    const double speed = std::hypot(spread(v.x, v.size()), spread(v.y, v.size()), spread(v.z, v.size()));
+    return speed > 0 ? kMostDeforming * body.body->spacing() / speed : kNoLimit;
+}
+
 class ExplicitSteps {
 public:
     ExplicitSteps(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context)
@@ -128,7 +146,7 @@ public:
     double run() {
         if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
         find_contacts();
-        const float first_dt = float(state_.frame_seconds() / state_.options.most_substeps);
+        const float first_dt = float(state_.frame_seconds() / kUsualSubsteps);
         find_forces(first_dt);
         if (repair_start(state_, elastic_, report_, context_)) {
             state_.contacts.begin_anew();
@@ -141,7 +159,7 @@ public:
         const auto is_left = [&] { return until_ - now_ > 1e-9 * state_.frame_seconds(); };
         while (is_left()) {
             const double steps = steps_left();
-            if (!(steps <= steps_allowed()) || context_.is_cancelled()) break;
+            if (!is_finite_ || context_.is_cancelled()) break;
             const float dt = float((until_ - now_) / steps);
             const double before = now_;
             move(dt, steps <= 1 ? until_ : now_ + double(dt));
@@ -162,18 +180,13 @@ public:
     }
 
 private:
+    /// As many as stability asks for, up to kMostSubsteps in the whole frame: what no step is short enough for takes
+    /// those.
     double steps_left() const {
         const double remaining = until_ - now_;
         const double fewest = std::ceil(kLeastSubsteps * remaining / state_.frame_seconds() - 1e-6);
-        return stable_step_ > 0 ? std::max(fewest, std::ceil(remaining / stable_step_)) : kExplicitLimit + 1.0;
-    }
-    /// A frame that was begun may take twice as many. Where bodies meet fast descent takes more substeps as well.
-    double steps_allowed() const {
-        double limit = kExplicitLimit;
-        if (state_.options.mode == StepMode::automatic)
-            limit = state_.options.most_substeps * state_.frame_seconds() /
-                    (state_.options.descent_substeps * state_.descent_step(state_.contacts.longest_step()));
-        return report_.substeps == 0 ? limit : 2 * limit - report_.substeps;
+        const double most = std::max(1.0, double(kMostSubsteps) - report_.substeps);
+        return std::min(most, std::max(fewest, std::ceil(remaining / stable_step_)));
     }
 
     /// Particles of rigid bodies as their poses have them after the last kick.
@@ -242,13 +255,15 @@ private:
         each_awake([&](const BodyState& body, std::size_t b) {
             if (body.rigid) rigid_loads_[b] = rigid_load(body);
         });
-        for (std::size_t b = 0; b < bodies_.size(); ++b)
-            if (!bodies_[b].sleeps())
-                stable_in_frame_ =
-                    std::min(stable_in_frame_, stable_step(frequencies[b], double(vibrations_[b].delay)));
+        is_finite_ = true;
+        for (std::size_t b = 0; b < bodies_.size(); ++b) {
+            if (bodies_[b].sleeps()) continue;
+            is_finite_ &= std::isfinite(frequencies[b]);
+            stable_in_frame_ = std::min(stable_in_frame_, stable_step(frequencies[b], double(vibrations_[b].delay)));
+            if (!bodies_[b].rigid) stable_step_ = std::min(stable_step_, deforming_step(bodies_[b]));
+        }
         stable_step_ = std::min(stable_step_, stable_in_frame_);
-        const double shortest = std::max(kShortestOpening * stable_step_, (until_ - now_) / steps_allowed());
-        stable_step_ = std::min(stable_step_, std::max(opening_step, shortest));
+        stable_step_ = std::min(stable_step_, std::max(opening_step, kShortestOpening * stable_step_));
     }
 
     /// s of internal damping, unless more is needed.
@@ -369,6 +384,7 @@ private:
     std::vector<Vibration> vibrations_;
     std::vector<RigidLoad> rigid_loads_; ///< of each body, by find_forces
     double stable_step_ = 0;             // s
+    bool is_finite_ = true;              ///< the forces found last
     /// s: the shortest step that any body's vibrations have asked for in this frame. Steps that become longer again as
     /// these swing give them energy.
     double stable_in_frame_ = kNoLimit;

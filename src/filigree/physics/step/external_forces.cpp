@@ -146,13 +146,4 @@ double ExternalForces::add_pulls(BodyState& body, std::size_t index, double time
     return squared_frequency;
 }
 
-std::vector<Vectors> ExternalForces::push_accelerations(std::span<const BodyState> bodies, double time) const {
-    std::vector<Vectors> accelerations(bodies.size());
-    for (std::size_t b = 0; b < bodies.size(); ++b) accelerations[b] = Vectors(bodies[b].positions.size());
-    each_push(bodies, time, [&](const BodyState&, std::size_t body, Index particle, const Vec3f& acceleration) {
-        accelerations[body].add(particle, acceleration);
-    });
-    return accelerations;
-}
-
 } // namespace filigree

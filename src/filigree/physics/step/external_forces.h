@@ -45,12 +45,6 @@ public:
     void add_forces(std::span<BodyState> bodies, double time, const RunContext& context) const;
     /// Adds the pull of hands to a body's forces. Returns the bound on its squared frequency with that of hands added.
     double add_pulls(BodyState& body, std::size_t index, double time, double squared_frequency) const;
-    /// The same forces as accelerations, m/s^2, without hands: of regions and particles all in one, and of the wind on
-    /// a particle.
-    std::vector<Vectors> push_accelerations(std::span<const BodyState> bodies, double time) const;
-    Vec3f wind_acceleration(const BodyState& body, std::size_t index, std::size_t particle) const {
-        return body.inverse_mass[particle] * wind_[index][particle];
-    }
     bool has_wind() const { return world_.air_density > 0; }
 
 private:

@@ -44,18 +44,14 @@ struct SimulationState {
     double time() const { return double(frame) * frame_seconds(); }
     std::vector<Attachment*> attachments_of(std::size_t body);
     const Cracks* cracks_of(std::size_t body) const; ///< null: it does not break
-    /// s: a substep of descent, where bodies that meet could pass through each other in ones longer than `longest`.
-    double descent_step(double longest) const;
 };
 
-/// Steps by velocity Verlet as far as that goes. Returns the time reached: before `until` when steps became too many
-/// (for descent to go on) or the work was cancelled.
+/// Steps by velocity Verlet. Returns the time reached: before `until` where something is not finite any more, or the
+/// work was cancelled.
 double step_explicitly(SimulationState& state, double from, double until, FrameReport& report,
                        const RunContext& context);
-/// Steps by vertex block descent. Breaks off when cancelled.
-void step_by_descent(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context);
 
-// What both do in a substep.
+// Parts of a substep.
 
 /// What a body's elasticity met, into the frame's report.
 void note_deformation(FrameReport& report, std::size_t body, const ElasticReport& met);

@@ -1,4 +1,4 @@
-// The parts of a substep that explicit steps and descent share.
+// Parts of a substep.
 #include "filigree/core/random.h"
 #include "filigree/physics/rigid/rigid_body.h"
 #include "filigree/physics/step/lost_particles.h"
@@ -12,10 +12,10 @@ namespace filigree {
 
 namespace {
 
-constexpr float kMostStretch = 10; ///< a body that is stretched more than this ...
-constexpr float kStretchAfter = 3; ///< ... is scaled down to this
-constexpr double kReveals = 8;     ///< a frame: how often points of new cracks begin to touch others
-constexpr double kMostParts = 16;  ///< of a usual substep of descent, where bodies meet fast
+/// Largest |F| / sqrt(3) of a cell at a frame's start: a body with more is scaled down to kStretchAfter. Uniaxial
+/// stretch reaches it at 10 times the length.
+constexpr float kMostStretch = 6, kStretchAfter = 2;
+constexpr double kReveals = 8; ///< a frame: how often points of new cracks begin to touch others
 
 void shake(BodyState& body, std::uint64_t seed) {
     const auto shift = [&](std::size_t number) {
@@ -67,11 +67,6 @@ void note_deformation(FrameReport& report, std::size_t body, const ElasticReport
 const Cracks* SimulationState::cracks_of(std::size_t body) const {
     const auto found = std::ranges::find(cracks, body, &Cracks::whole);
     return found == cracks.end() ? nullptr : &*found;
-}
-
-double SimulationState::descent_step(double longest) const {
-    const double usual = frame_seconds() / options.descent_substeps;
-    return std::clamp(longest, usual / kMostParts, usual);
 }
 
 float least_spacing(std::span<const BodyState> bodies) {
