@@ -7,7 +7,7 @@
 
 #include <cmath>
 
-namespace filigree {
+namespace filigree::joined_parts_test {
 namespace {
 
 /// A box with inner faces left out nowhere: parts that overlap are one.
@@ -108,4 +108,4 @@ TEST(JoinedParts, TheSameForAnyNumberOfThreads) {
 }
 
 } // namespace
-} // namespace filigree
+} // namespace filigree::joined_parts_test

@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <numbers>
 
-namespace filigree {
+namespace filigree::own_weight_test {
 namespace {
 
 const Vec3d kDown(0, -9.81, 0);
@@ -47,7 +47,8 @@ TEST(OwnWeight, BeyondAFifthWhatWouldDoIsSaid) {
     EXPECT_EQ(said(jelly, 2 * 0.95 * limit), "");
     EXPECT_NE(said(jelly, 2 * 1.05 * limit), "");
     const std::string large = said(jelly, 4, 4.0);
-    EXPECT_NE(large.find("is 2 m high and weighs 8 t; it of that size cannot carry itself: size = "), std::string::npos)
+    EXPECT_NE(large.find("is 2 m high and weighs 16 t; it of that size cannot carry itself: size = "),
+              std::string::npos)
         << large;
     // What is proposed holds.
     const double proposed = std::stod(large.substr(large.find("size = ") + 7));
@@ -130,4 +131,4 @@ TEST(ClampedParticles, AreReportedWithBodyAndPlace) {
 }
 
 } // namespace
-} // namespace filigree
+} // namespace filigree::own_weight_test
