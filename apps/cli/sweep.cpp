@@ -210,7 +210,7 @@ private:
     std::string header() const {
         std::string line = "run,scene";
         for (const Setting& setting : settings_) line += ',' + field(setting.name);
-        line += ",body,particles,driver_vertices,mass_kg,frames,explicit_frames,substeps,least_volume_ratio,"
+        line += ",body,particles,driver_vertices,mass_kg,frames,substeps,least_volume_ratio,"
                 "most_stretch,most_contacts,deepest_contact_m,energy_start_j,energy_end_j";
         if (options_.check)
             line += ",check_rms_mean,check_rms_worst,check_max_worst,check_normal_p95_deg_mean,"
@@ -257,11 +257,10 @@ private:
                         const std::vector<FinerCheck>& finer) const {
         const RunTotals& t = run.recording().totals;
         const double frames = double(std::max<std::uint64_t>(t.frames, 1));
-        std::string line =
-            fmt::format(",{},{},{},{},{},{},{},{},{},{},{},{},{}", field(body.name), body.body->particle_count(),
-                        body.model.driver().vertices.size(), body.report.mass, t.frames, t.explicit_frames, t.substeps,
-                        t.least_volume_ratio, t.most_stretch, t.most_contacts, t.deepest_contact, t.start.total(),
-                        run.energy().total());
+        std::string line = fmt::format(",{},{},{},{},{},{},{},{},{},{},{},{}", field(body.name),
+                                       body.body->particle_count(), body.model.driver().vertices.size(),
+                                       body.report.mass, t.frames, t.substeps, t.least_volume_ratio, t.most_stretch,
+                                       t.most_contacts, t.deepest_contact, t.start.total(), run.energy().total());
         if (options_.check) {
             const CheckTotals& check = run.recording().checks[b];
             line += fmt::format(",{},{},{},{},{}", check.rms_sum / frames, check.worst_rms, check.worst_max,
