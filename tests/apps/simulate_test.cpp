@@ -114,26 +114,11 @@ TEST_F(Simulate, RepeatedBodiesHaveOneRow) {
     EXPECT_EQ(json(words("heap.toml", {"-o", "heap.fil"}))["bodies"].size(), 5u);
 }
 
-TEST_F(Simulate, SaysWhyFramesWereMadeByDescent) {
-    const auto causes = [&](const std::string& mode) {
-        std::string scene = kDrop;
-        write("causes.toml", scene.insert(scene.find("frames"), mode));
-        const std::string said = run({"simulate", "causes.toml", "--check"}).out;
-        EXPECT_EQ(said.find("frames by descent") != std::string::npos, !mode.empty()) << said;
-        const Json counts = this->json(words("causes.toml", {"--check"})).at("descent_causes");
-        return std::vector<int>{counts.at("chosen"), counts.at("too_many_substeps"), counts.at("not_finite")};
-    };
-    EXPECT_EQ(causes(""), (std::vector<int>{0, 0, 0}));
-    EXPECT_EQ(causes("mode = \"descent\"\n"), (std::vector<int>{6, 0, 0}));
-    EXPECT_EQ(causes("most_substeps = 1\n"), (std::vector<int>{0, 6, 0}));
-}
-
 TEST_F(Simulate, ACubeFallsAndItsPosesPlay) {
     const Json json = this->json(words("drop.toml", {"-o", "drop.fil"}));
     EXPECT_EQ(json["frames"], 6);
     EXPECT_EQ(json["bodies"][0]["name"], "cube");
     EXPECT_NEAR(json["bodies"][0]["mass_kg"].get<double>(), 1060, 60); // rubber, a cube of 1 m with coarse waves
-    EXPECT_EQ(json["explicit_frames"].get<int>() + json["descent_frames"].get<int>(), 6);
     EXPECT_GT(json["most_contacts"], 0);
     EXPECT_LT(json["energy_end"]["potential"], json["energy_start"]["potential"]);
 
@@ -294,15 +279,6 @@ TEST_F(Simulate, WarnsOfMotionThatIsNotToBeTrusted) {
     const std::string apart = kDrop + "[[body]]\nshape = \"bar\"\nparticles = 100\nresolution = 4\ncentre = [";
     EXPECT_EQ(warnings(apart + "500, 3, 0]\n", {"--check", "--frames", "1"}), "[]");
     EXPECT_NE(warnings(apart + "1e5, 3, 0]\n", {"--check", "--frames", "1"}).find("body 'bar'"), std::string::npos);
-
-    std::string descent = kDrop;
-    descent.insert(descent.find("frames"), "mode = \"descent\"\n");
-    EXPECT_EQ(warnings(descent, {"--check"}), "[]");
-    const std::string hard = "[[obstacle]]\nshape = \"ball\"\ncentre = [9, 9, 9]\nrestitution = 1\n";
-    EXPECT_NE(warnings(descent + hard, {"--check"}).find("6 frames were computed by descent"), std::string::npos);
-    EXPECT_EQ(warnings(kDrop + hard, {"--check"}), "[]");
-    descent.insert(descent.find("young"), "internal_damping = 0.001\n");
-    EXPECT_NE(warnings(descent, {"--check"}).find("internal_damping"), std::string::npos);
 }
 
 TEST_F(Simulate, SeveralBodiesAreFilesOfTheirOwn) {
@@ -460,7 +436,7 @@ TEST_F(Simulate, WrongTypesAndRangesAreNamed) {
     refused(kBody + "[[pair]]\nfirst = \"bar\"\nsecond = \"bar\"\nfriction = -1\n", {"bad.toml:6:", "friction"});
     refused(kBody + "[[hand]]\ntarget = [0, 0, 0]\n", {"bad.toml:3:", "point and vertex"});
     refused(kBody + "[simulation]\nframes = 1\nduration = 2\n", {"bad.toml:5:", "frames and duration"});
-    refused(kBody + "[simulation]\nmode = \"fast\"\n", {"bad.toml:4:", "auto, explicit, descent"});
+    refused(kBody + "[simulation]\nmode = \"fast\"\n", {"bad.toml:4:", "auto, explicit"});
 }
 
 TEST_F(Simulate, WhatIsNoSceneIsRefused) {
@@ -554,8 +530,6 @@ TEST_F(Simulate, TheManualsDefaultsAreTheLibrarys) {
     const StepOptions step;
     EXPECT_EQ(unset("[simulation]", "frames_per_second"), step.frames_per_second);
     EXPECT_EQ(unset("[simulation]", "most_substeps"), step.most_substeps);
-    EXPECT_EQ(unset("[simulation]", "descent_substeps"), step.descent_substeps);
-    EXPECT_EQ(unset("[simulation]", "descent_iterations"), step.descent_iterations);
     EXPECT_EQ(unset("[world]", "body_friction"), World{}.body_friction);
     EXPECT_EQ(unset("[world]", "body_restitution"), World{}.body_restitution);
     EXPECT_EQ(unset("[[body]]", "particles"), BodyOptions{}.cells.count);
