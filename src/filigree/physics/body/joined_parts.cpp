@@ -22,7 +22,7 @@ constexpr double kMostBoxCells = 0x1p24;
 constexpr int kCellsNear = 1, kCellsFar = 4; ///< cells to either side of a corner that are looked at
 constexpr int kLeastPart = 64;               ///< samples: smaller parts are flecks
 /// Of all corners: fewer that join something are creases, where two parts part that hang together further on.
-constexpr double kFewCorners = 0.004;
+constexpr double kFewCorners = 0.008;
 constexpr std::size_t kFewestCorners = 6;
 
 std::string two_digits(double x) {
