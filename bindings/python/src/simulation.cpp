@@ -2,7 +2,9 @@
 #include "world.h"
 
 #include "filigree/physics/grid_limits.h"
+#include <filigree/physics/own_weight.h>
 
+#include <cstdio>
 #include <mutex>
 
 namespace filigree::python {
@@ -100,10 +102,17 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
     options.contacts_between_bodies = contacts_between_bodies;
     options.contacts_within_bodies = contacts_within_bodies;
     options.automatic_rigid = automatic_rigid;
-    std::vector<std::string> told;
-    if (const std::string sentence = why_models_do_not_meet(actors); !sentence.empty()) told.push_back(sentence + ".");
+    std::vector<std::string> sentences;
+    for (std::size_t b = 0; b < actors.size(); ++b)
+        if (const std::string weight =
+                weight_warning(*actors[b].body, actors[b].placement.linear(), world.gravity, "such soft matter");
+            !weight.empty())
+            sentences.push_back("Body " + std::to_string(b) + " " + weight);
+    if (const std::string sentence = why_models_do_not_meet(actors); !sentence.empty())
+        sentences.push_back(sentence + ".");
     for (const SlenderObstacle& slender : find_slender_obstacles(world, actors))
-        told.push_back(slender.sentence("obstacle " + std::to_string(slender.obstacle)) + ".");
+        sentences.push_back(slender.sentence("obstacle " + std::to_string(slender.obstacle)) + ".");
+    warn(sentences);
     Simulation made = LongCall{threads}([&](const RunContext& context) {
         return Simulation::create(std::move(world), std::move(actors), options, context).value();
     });
@@ -124,6 +133,8 @@ py::dict said_of(const FrameReport& report) {
     said["least_volume_ratio"] = report.least_volume_ratio;
     said["most_stretch"] = report.most_stretch;
     said["clamped_particles"] = report.clamped_particles;
+    said["clamped_body"] = report.clamped_body;
+    said["clamped_at"] = array_of(report.clamped_at.cast<double>());
     seconds["elastic"] = report.elastic_seconds;
     seconds["contact"] = report.contact_seconds;
     seconds["other"] = report.other_seconds;
@@ -131,14 +142,52 @@ py::dict said_of(const FrameReport& report) {
     return said;
 }
 
+std::string text_of(const Vec3f& place) {
+    char text[96];
+    std::snprintf(text, sizeof text, "(%.3g, %.3g, %.3g) m", double(place.x()), double(place.y()), double(place.z()));
+    return text;
+}
+
+/// A sentence where a frame came out wrong, or "".
+std::string doubt_of(const Simulation& simulation, const FrameReport& report) {
+    const std::string frame = "Frame " + std::to_string(simulation.frame()) + ": ";
+    const std::string mend = "; make it smaller, stiffer (young_modulus) or slower.";
+    if (report.clamped_particles > 0)
+        return frame + std::to_string(report.clamped_particles) +
+               " motions of particles were not finite or had to be limited, the first of body " +
+               std::to_string(report.clamped_body) + " near " + text_of(report.clamped_at) + mend;
+    if (report.least_volume_ratio > 0) return "";
+    for (std::size_t b = 0; b < simulation.body_count(); ++b)
+        if (const InvertedCells cells = simulation.inverted(b); cells.count > 0)
+            return frame + std::to_string(cells.count) + " cells of body " + std::to_string(b) +
+                   " are inside out, the worst near " + text_of(cells.place) + mend;
+    return "";
+}
+
 py::dict step(PySimulation& self, unsigned frames) {
     if (frames == 0) refuse("frames has to be 1 or more.");
-    return said_of(LongCall{self.threads}([&](const RunContext& context) {
+    std::string doubt;
+    const py::dict said = said_of(LongCall{self.threads}([&](const RunContext& context) {
         const std::lock_guard lock(self.mutex);
         FrameReport report;
-        for (unsigned k = 0; k < frames; ++k) report = self.simulation.advance(context).value();
+        for (unsigned k = 0; k < frames; ++k) {
+            report = self.simulation.advance(context).value();
+            if (doubt.empty()) doubt = doubt_of(self.simulation, report);
+        }
         return report;
     }));
+    if (!doubt.empty()) warn({doubt});
+    return said;
+}
+
+py::dict inverted(PySimulation& self, std::size_t body) {
+    self.checked(body);
+    const InvertedCells cells = self.alone([&] { return self.simulation.inverted(body); });
+    py::dict said;
+    said["count"] = cells.count;
+    said["least"] = cells.least;
+    said["place"] = array_of(cells.place.cast<double>());
+    return said;
 }
 
 Attachment attach(const SimulationPtr& self, std::size_t body, const py::object& what) {
@@ -218,10 +267,15 @@ Raises
 UsageError
     With the place of the first thing that is wrong.
 
+Warns
+-----
+FiligreeWarning
+    A body that its own weight would flatten.
+
 Examples
 --------
 >>> model = filigree.strip(filigree.make("wavy-cube", resolution=16))
->>> body = filigree.Body(model.mesh, "jelly", particles=500)
+>>> body = filigree.Body(model.mesh, "jelly", particles=500, size=0.2)
 >>> floor = filigree.Obstacle.plane((0, -1, 0))
 >>> simulation = filigree.Simulation([body], obstacles=[floor])
 >>> driver = simulation.attach(0, model)
@@ -252,6 +306,21 @@ Returns
 -------
 dict
     Of the last frame: 'substeps', 'contacts', 'deepest_contact', 'least_volume_ratio' and more.
+
+Warns
+-----
+FiligreeWarning
+    Of any of the frames: a motion was not finite or had to be limited, or cells were inside out at the end.
+)")
+        .def("inverted", &inverted, py::arg("body"), R"(inverted(self, body)
+--
+
+Cells of a body of 'fem' or 'springs' that are inside out now.
+
+Returns
+-------
+dict
+    'count', 'least' (the smallest volume of a cell, as a part of that at rest) and 'place' (of that cell, m, float64 (3,)).
 )")
         .def_property_readonly(
             "frame", [](PySimulation& self) { return self.alone([&] { return self.simulation.frame(); }); },

@@ -43,7 +43,7 @@ Embedding embed_to_follow(std::span<const Vec3f> points, const Vectors& rest, do
 /// corners of cells.
 Embedding embed_in_cells(std::span<const Vec3f> points, const Cells& cells, const RunContext& context);
 
-/// Where the points went, and the deformation gradients there, by the Hermite form of docs/bodies.md:
+/// Where the points went, and the deformation gradients there, by the Hermite form of docs/bodies-theory.md:
 ///     A = sum w F_j,   c' = sum w (x_j + 1/2 (F_j + A) (c - X_j)).
 /// An affine motion of the particles is followed exactly. `gradients` may be empty: not wanted. Cost O(weights).
 void move_embedded(const Embedding& embedding, const Vectors& rest, const Vectors& positions,

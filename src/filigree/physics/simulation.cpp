@@ -4,6 +4,7 @@
 #include "filigree/physics/rigid/rigid_body.h"
 #include "filigree/physics/rigid/rigid_state.h"
 #include "filigree/physics/rigid/sleep.h"
+#include "filigree/physics/step/inverted_cells.h"
 #include "filigree/physics/step/lost_particles.h"
 #include "filigree/physics/step/simulation_state.h"
 
@@ -232,6 +233,7 @@ Result<FrameReport> step_frame(SimulationState& state, const RunContext& context
     if (context.is_cancelled()) return cancelled_error();
     held += hold_lost_particles(state);
     report.clamped_particles += held;
+    tell_first_lost(state, report);
     report.most_crushed = state.bodies[report.most_crushed].actor;
     for (const Cracks& cracks : state.cracks) cracks.show_whole(state.bodies);
     let_rest(state, from, until);
@@ -421,6 +423,11 @@ Momentum Simulation::momentum() const {
     }
     momentum.angular += state_->grid->affine_momentum();
     return momentum;
+}
+
+InvertedCells Simulation::inverted(std::size_t body) const {
+    assert(body < body_count());
+    return inverted_cells(*state_, body);
 }
 
 FractureReport Simulation::fracture(std::size_t body) const {

@@ -45,6 +45,15 @@ struct FrameReport {
     float most_stretch = 1;
     double elastic_seconds = 0, contact_seconds = 0, other_seconds = 0;
     std::size_t clamped_particles = 0; ///< whose motion was not finite, or whose start was scaled down
+    std::size_t clamped_body = 0;      ///< that the first of them is of
+    Vec3f clamped_at = Vec3f::Zero();  ///< world, m: where that one stands
+};
+
+/// Cells that are inside out.
+struct InvertedCells {
+    std::size_t count = 0;
+    float least = 1;             ///< the smallest volume of all of the body's cells, as a part of that at rest
+    Vec3f place = Vec3f::Zero(); ///< world, m: the middle of that one
 };
 
 struct Energy {
@@ -124,6 +133,8 @@ public:
     Energy energy(const RunContext& context) const;
     Momentum momentum() const;
     FractureReport fracture(std::size_t body) const;
+    /// As a body's cells are now, pieces' included; of models without cells, and of rigid bodies, none. Cost O(cells).
+    InvertedCells inverted(std::size_t body) const;
 
     /// Points that go along with a body: its driver, or all of a mesh. Positions on the body at rest, m, also of a body
     /// that has flowed since. Returns a number for `attached`. Cost: as embed.

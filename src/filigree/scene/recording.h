@@ -3,6 +3,7 @@
 
 #include "filigree/hierarchy/pose.h"
 #include "filigree/physics/simulation.h"
+#include "filigree/scene/doubts.h"
 
 #include <cstdint>
 #include <optional>
@@ -42,18 +43,6 @@ struct RunTimes {
     void add(const FrameReport& report);
 };
 
-/// How far a body was crushed.
-struct Crush {
-    std::uint64_t first = 0, worst = 0; ///< frames: first in which a cell kept too little, and of the least volume
-    float least = 1;                    ///< volume of a cell, of that at rest
-};
-
-/// What makes a body's motion doubtful.
-struct BodyDoubts {
-    std::optional<std::uint64_t> first_lost; ///< the first frame in which hold_lost held some
-    std::optional<Crush> crush;
-};
-
 struct Recording {
     std::vector<PoseSequence> poses;                        ///< one a body; the first is the start
     std::vector<std::vector<std::vector<Vec3f>>> particles; ///< of each body and frame, where they are drawn
@@ -61,7 +50,8 @@ struct Recording {
     std::vector<CheckTotals> checks;                        ///< one a body where that was asked for, else none
     RunTotals totals;
     std::vector<BodyDoubts> doubts; ///< one a body
-    float last_volume_ratio = 1;    ///< the least of the last frame
+    std::optional<FirstLoss> first_loss;
+    EnergyWatch energy;
 };
 
 /// Driver vertices that went nowhere sensible in a frame stay where they were, so that one does not spoil all.

@@ -7,7 +7,7 @@
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/triangulate.h"
 #include "filigree/physics/grid_limits.h"
-#include "filigree/scene/own_weight.h"
+#include "filigree/physics/own_weight.h"
 #include "filigree/scene/particles_near.h"
 
 #include <algorithm>
@@ -141,49 +141,54 @@ private:
     }
 
     void add_body(const SceneBody& from) {
-        ReadyBody body;
+        const auto alike = std::ranges::find(result_.bodies, from.group, &ReadyBody::group);
+        const bool is_another = !from.group.empty() && alike != result_.bodies.end();
+        ReadyBody body = is_another ? *alike : ready(from);
         body.name = from.name;
+        body.color = from.color.value_or(kBodyColors[result_.bodies.size() % std::size(kBodyColors)]);
+        body.has_own_color = !from.color;
+        const Vec3d middle = body.scale * body_box(body).centre();
+        Actor actor{.body = body.body, .velocity = from.velocity, .spin = from.spin, .may_sleep = from.may_sleep};
+        const Vec3d centre = from.centre.value_or(middle + body.scale * body.origin) + from.aside;
+        actor.placement = Eigen::Translation3d(centre) * from.rotation * Eigen::Translation3d(-middle);
+        if (!is_another) warn_of_weight(from, *body.body, actor.placement.linear());
+        result_.actors.push_back(std::move(actor));
+        result_.bodies.push_back(std::move(body));
+    }
+
+    /// What a body is made of and from, wherever it stands.
+    ReadyBody ready(const SceneBody& from) {
+        ReadyBody body;
+        body.group = from.group;
         body.mesh_path = from.mesh;
         body.model = at_line(scene_, from.line, [&] { return model_of(from); });
         Mesh& mesh = body.model.mesh;
-        BodyOptions options = from.body;
-        if (from.size) options.scale = scale_of(mesh, from);
-        body.scale = options.scale;
-        const Vec3d origin = std::exchange(mesh.origin, Vec3d::Zero());
+        body.origin = std::exchange(mesh.origin, Vec3d::Zero());
         hash_.add(mesh.positions);
         hash_.add(mesh.corners);
         body.body = at_line(scene_, from.line, [&] {
             return std::make_shared<const Body>(
-                make_body(mesh, from.material, options, context_, &body.report).value());
+                make_body(mesh, from.material, from.body, context_, &body.report).value());
         });
-        if (!body.report.warning.empty()) warn("body '" + body.name + "': " + body.report.warning);
+        body.scale = body.body->scale;
+        if (!body.report.warning.empty()) warn(called(from) + ": " + body.report.warning);
         const bool has_own_driver = !body.model.levels.empty();
         if (!has_own_driver)
             body.model = at_line(scene_, from.line, [&] { return stripped(std::move(mesh), from, *body.body); });
         hash_.add(body.model.driver().vertices);
         body.driver = measure_driver(body.model, *body.body);
         const std::string coarse = driver_warning(body.driver, body.model, *body.body);
-        if (has_own_driver && !coarse.empty()) warn("body '" + body.name + "': " + coarse);
-        body.color = from.color.value_or(kBodyColors[result_.bodies.size() % std::size(kBodyColors)]);
-        body.has_own_color = !from.color;
-
-        const Vec3d middle = body.scale * body_box(body).centre();
-        Actor actor{body.body, Eigen::Isometry3d::Identity(), from.velocity, from.spin};
-        actor.placement = Eigen::Translation3d(from.centre.value_or(middle + body.scale * origin)) * from.rotation *
-                          Eigen::Translation3d(-middle);
-        const std::string weight =
-            weight_warning(*body.body, body_box(body), actor.placement.linear(), scene_.gravity, from.material_name);
-        if (!weight.empty()) warn("body '" + body.name + "' " + weight);
-        result_.actors.push_back(std::move(actor));
-        result_.bodies.push_back(std::move(body));
+        if (has_own_driver && !coarse.empty()) warn(called(from) + ": " + coarse);
+        return body;
     }
 
-    /// m a model unit, for a mesh whose longest side the scene says.
-    double scale_of(const Mesh& mesh, const SceneBody& from) const {
-        const double longest = bounds(mesh).size().maxCoeff();
-        if (!(longest > 0))
-            fail_in_scene(scene_, from.line, ErrorCode::unsuitable, from.mesh + ": has no size that could be scaled");
-        return *from.size / longest;
+    static std::string called(const SceneBody& body) {
+        return fmt::format("body '{}'", body.group.empty() ? body.name : body.group);
+    }
+
+    void warn_of_weight(const SceneBody& from, const Body& body, const Mat3d& turn) {
+        const std::string weight = weight_warning(body, turn, scene_.gravity, from.material_name, from.body.size);
+        if (!weight.empty()) warn(called(from) + " " + weight);
     }
 
     /// The middle of the bodies where it is far from the world's origin, rounded so that taking it off is exact.

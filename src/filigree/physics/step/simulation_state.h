@@ -27,10 +27,11 @@ struct SimulationState {
     const StepOptions options;
     const std::size_t actor_count;
     const MadeFor made_for;
-    std::vector<BodyState> bodies;      ///< of the actors, then pieces
-    std::vector<std::string> why_rigid; ///< of each actor: Simulation::why_rigid
+    std::vector<BodyState> bodies;                           ///< of the actors, then pieces
+    std::vector<std::string> why_rigid;                      ///< of each actor: Simulation::why_rigid
+    std::optional<std::pair<std::size_t, Vec3f>> first_lost; ///< of this frame: actor and place (lost_particles.h)
     std::vector<StartOverlap> start_overlaps;
-    std::vector<Cracks> cracks; ///< of bodies that break
+    std::vector<Cracks> cracks;                              ///< of bodies that break
     Contacts contacts;
     ExternalForces external;
     std::unique_ptr<mpm::Bodies> grid; ///< of bodies of mpm; never null

@@ -1,6 +1,7 @@
 // Parts of a substep.
 #include "filigree/core/random.h"
 #include "filigree/physics/rigid/rigid_body.h"
+#include "filigree/physics/step/lost_particles.h"
 #include "filigree/physics/step/simulation_state.h"
 
 #include <algorithm>
@@ -104,7 +105,9 @@ bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic
         if (elastic[b].most_stretch <= kMostStretch) continue;
         repaired = true;
         const float factor = std::isfinite(elastic[b].most_stretch) ? kStretchAfter / elastic[b].most_stretch : 0.0f;
-        report.clamped_particles += scale_down(state.bodies[b], factor);
+        const std::size_t moved = scale_down(state.bodies[b], factor);
+        if (moved > 0) note_lost(state, state.bodies[b], 0);
+        report.clamped_particles += moved;
         state.contacts.was_placed(b);
     }
     return repaired;
