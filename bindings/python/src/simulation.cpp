@@ -1,7 +1,7 @@
 #include "models.h"
 #include "world.h"
 
-#include "filigree/physics/grid_limits.h"
+#include <filigree/physics/grid_limits.h>
 #include <filigree/physics/own_weight.h>
 
 #include <cstdio>
@@ -112,15 +112,14 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
         sentences.push_back(sentence + ".");
     for (const SlenderObstacle& slender : find_slender_obstacles(world, actors))
         sentences.push_back(slender.sentence("obstacle " + std::to_string(slender.obstacle)) + ".");
-    warn(sentences);
     Simulation made = LongCall{threads}([&](const RunContext& context) {
         return Simulation::create(std::move(world), std::move(actors), options, context).value();
     });
     for (const StartOverlap& overlap : made.start_overlaps())
-        told.push_back(
+        sentences.push_back(
             overlap.sentence("body " + std::to_string(overlap.body), "obstacle " + std::to_string(overlap.obstacle)) +
             ".");
-    warn(told);
+    warn(sentences);
     return SimulationPtr(new PySimulation{std::move(held), std::move(made), threads});
 }
 

@@ -31,7 +31,7 @@ struct SimulationState {
     std::vector<std::string> why_rigid;                      ///< of each actor: Simulation::why_rigid
     std::optional<std::pair<std::size_t, Vec3f>> first_lost; ///< of this frame: actor and place (lost_particles.h)
     std::vector<StartOverlap> start_overlaps;
-    std::vector<Cracks> cracks;                              ///< of bodies that break
+    std::vector<Cracks> cracks; ///< of bodies that break
     Contacts contacts;
     ExternalForces external;
     std::unique_ptr<mpm::Bodies> grid; ///< of bodies of mpm; never null
