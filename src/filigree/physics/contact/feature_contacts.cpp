@@ -166,7 +166,7 @@ void FeatureContacts::push_out(std::span<BodyState> bodies, const MatterContacts
         const float inwards = std::max(0.0f, (of.mean(deep.place, body.velocities) - deep.velocity).dot(deep.normal));
         const Vec3f way = -deep.depth / gives * deep.normal, push = -inwards / gives * deep.normal;
         for (int c = 0; c < 8; ++c)
-            if (weights[c] != 0) push_particle(body, corners[c], weights[c], way, push);
+            if (weights[c] != 0) push_particle(body, corners[c], weights[c], way, push, deep.depth);
     }
 }
 
