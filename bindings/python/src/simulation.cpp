@@ -103,9 +103,9 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
     });
     std::vector<std::string> overlaps;
     for (const StartOverlap& overlap : made.start_overlaps())
-        overlaps.push_back(overlap.sentence("body " + std::to_string(overlap.body),
-                                            "obstacle " + std::to_string(overlap.obstacle)) +
-                           ".");
+        overlaps.push_back(
+            overlap.sentence("body " + std::to_string(overlap.body), "obstacle " + std::to_string(overlap.obstacle)) +
+            ".");
     warn(overlaps);
     return SimulationPtr(new PySimulation{std::move(held), std::move(made), threads});
 }

@@ -270,9 +270,9 @@ private:
 
     const World& world_;
     bool between_bodies_, within_bodies_;
-    std::vector<Vec3f> towards_;      ///< of each obstacle, the way to it: of half-spaces that stand still; else 0
-    std::vector<NearPoints> near_;    ///< by body
-    std::vector<float> deepest_near_; ///< m, of each body, now
+    std::vector<Vec3f> towards_;         ///< of each obstacle, the way to it: of half-spaces that stand still; else 0
+    std::vector<NearPoints> near_;       ///< by body
+    std::vector<float> deepest_near_;    ///< m, of each body, now
     struct ParticleDepths {              ///< of a body that was crushed, of each particle
         std::vector<float> most;         ///< m that it may go into an obstacle
         std::vector<Index> near_surface; ///< the surface point that is about the closest at rest

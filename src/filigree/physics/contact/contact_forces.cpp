@@ -82,8 +82,8 @@ std::vector<Index> near_surface_points(const Body& body, const RunContext& conte
 
 } // namespace
 
-/// Follows a point to `place`. Below 0, how deep it is behind the wall that it touches; else how far it may go. touched:
-/// when it was asked last.
+/// Follows a point to `place`. Below 0, how deep it is behind the wall that it touches; else how far it may go.
+/// touched: when it was asked last.
 DistanceField::Sample Contacts::follow(std::size_t obstacle, Trace& trace, bool touched, const Vec3f& place,
                                        const ObstaclePoses& poses) const {
     const ObstacleShape& shape = shapes_[obstacle];
@@ -119,8 +119,8 @@ Vec3f Contacts::obstacle_force(Near& at, Trace* trace, float& clear_until, const
     at.depth = 0;
     const Obstacle& obstacle = world_.obstacles[at.obstacle];
     const Vec3f place = embedded_point(body.surface, at.point, body.positions);
-    const DistanceField::Sample surface = trace ? follow(at.obstacle, *trace, touched, place, poses)
-                                                : poses.distance_to(at.obstacle, place);
+    const DistanceField::Sample surface =
+        trace ? follow(at.obstacle, *trace, touched, place, poses) : poses.distance_to(at.obstacle, place);
     clear_until = near_way_ + surface.distance;
     if (!(surface.distance < 0)) {
         at.grasp = {};
@@ -309,8 +309,8 @@ void Contacts::push_out(std::span<BodyState> bodies, double time, const RunConte
     matter_.push_out(bodies);
 }
 
-/// How deep each particle is in an obstacle: below 0 behind its surface. Particles are not followed; beside what a point
-/// is followed beside, they are on the right side if nothing stands between them and their surface point's place.
+/// How deep each particle is in an obstacle: below 0 behind its surface. Particles are not followed; beside what a
+/// point is followed beside, they are on the right side if nothing stands between them and their surface point's place.
 std::vector<DistanceField::Sample> Contacts::depths_of_particles(const BodyState& body, std::size_t b,
                                                                  std::size_t obstacle, const ObstaclePoses& poses,
                                                                  const RunContext& context) {
@@ -344,8 +344,7 @@ std::vector<DistanceField::Sample> Contacts::depths_of_particles(const BodyState
 void Contacts::push_particles_out(BodyState& body, std::size_t b, std::size_t obstacle, const Vec3f& outwards,
                                   const ObstaclePoses& poses, const RunContext& context) {
     ParticleDepths& depths = particle_depths_[body.body.get()];
-    if (depths.most.empty())
-        depths = {most_depths_of(*body.body, context), near_surface_points(*body.body, context)};
+    if (depths.most.empty()) depths = {most_depths_of(*body.body, context), near_surface_points(*body.body, context)};
     // distance: m beyond the limit, below 0
     std::vector<DistanceField::Sample> found = depths_of_particles(body, b, obstacle, poses, context);
     for (std::size_t i = 0; i < found.size(); ++i)

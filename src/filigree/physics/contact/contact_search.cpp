@@ -43,7 +43,8 @@ struct Contacts::OwnBalls {
 
 Contacts::Contacts(const World& world, std::size_t bodies, std::size_t actors, bool between_bodies, bool within_bodies)
     : world_(world), between_bodies_(between_bodies), within_bodies_(within_bodies), near_(bodies),
-      deepest_near_(bodies, 0), touched_(bodies, 0), matter_(world, actors, between_bodies, within_bodies), features_(world) {
+      deepest_near_(bodies, 0), touched_(bodies, 0), matter_(world, actors, between_bodies, within_bodies),
+      features_(world) {
     for (const Obstacle& obstacle : world.obstacles) {
         const auto* ground = std::get_if<HalfSpace>(&obstacle.shape);
         const bool stands = ground && !obstacle.motion.moves();
@@ -127,8 +128,7 @@ private:
 
     /// Of a half-space, or a field.
     void add_below(std::size_t o) {
-        const float nearest =
-            poses_.distance_to(o, box_.centre().cast<float>()).distance - float(box_.diagonal() / 2);
+        const float nearest = poses_.distance_to(o, box_.centre().cast<float>()).distance - float(box_.diagonal() / 2);
         if (nearest > reach_) return;
         parallel_for(context_, places_.size(), kContactSearchGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t s = begin; s < end; ++s) distances_[s] = poses_.distance_to(o, places_[s]).distance;
@@ -171,8 +171,8 @@ private:
     void keep(std::size_t k, const Vec3d& place, float distance) {
         Near near = old_.points[k];
         Trace trace = old_.traces[near.trace];
-        const bool may_have_met = !(old_.clear_until[k] > contacts_.near_way_) ||
-                                  !((place - trace.place).norm() < double(distance));
+        const bool may_have_met =
+            !(old_.clear_until[k] > contacts_.near_way_) || !((place - trace.place).norm() < double(distance));
         const bool is_asked = near.depth > 0 || near.grasp.holds || may_have_met;
         if (!is_asked && !(distance < reach_)) return;
         if (!is_asked) trace.place = place;
@@ -314,8 +314,8 @@ Contacts::Memory Contacts::memory() const {
 bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodies) {
     const auto is_sound = [&](const NearMemory& near) {
         return near.body < bodies.size() && near.obstacle < world_.obstacles.size() &&
-               near.point < bodies[near.body].surface.size() && near.anchor.allFinite() &&
-               near.place.allFinite() && std::isfinite(near.clear_until);
+               near.point < bodies[near.body].surface.size() && near.anchor.allFinite() && near.place.allFinite() &&
+               std::isfinite(near.clear_until);
     };
     const auto are_balls = [&](const BallMemory& pair) {
         return std::pair(pair.first_body, pair.first) < std::pair(pair.second_body, pair.second) &&
@@ -333,8 +333,8 @@ bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodie
         NearPoints& of = near_[near.body];
         const bool is_traced = shapes_[near.obstacle].is_traced();
         const float touches = (near.flags & 4) != 0 ? std::numeric_limits<float>::min() : 0; // found with the forces
-        of.points.push_back({near.obstacle, near.point, touches, grasp, near.anchor,
-                             is_traced ? Index(of.traces.size()) : kNoIndex});
+        of.points.push_back(
+            {near.obstacle, near.point, touches, grasp, near.anchor, is_traced ? Index(of.traces.size()) : kNoIndex});
         if (is_traced) of.traces.push_back({near.place, Vec3f::Zero()});
         near_[near.body].clear_until.push_back(near.clear_until);
     }

@@ -9,12 +9,12 @@ using namespace contact_law;
 
 namespace {
 
-constexpr double kMostParts = 4096; // of an edge
-constexpr float kFree = 0.1f;          // spacings: so deep may be what surface points carry
-constexpr float kShareOfPoints = 0.5f; // of the stiffness that a particle's surface points may have
+constexpr double kMostEdgeParts = 4096; // of an edge
+constexpr float kFree = 0.1f;           // spacings: so deep may be what surface points carry
+constexpr float kShareOfPoints = 0.5f;  // of the stiffness that a particle's surface points may have
 
 Index parts_of(const ObstacleShape::Edge& edge, double spacing) {
-    return Index(std::clamp(std::ceil((edge.to - edge.from).norm() / spacing), 1.0, kMostParts));
+    return Index(std::clamp(std::ceil((edge.to - edge.from).norm() / spacing), 1.0, kMostEdgeParts));
 }
 
 Vec3d point_of(const ObstacleShape::Edge& edge, Index part, Index parts) {
@@ -46,6 +46,26 @@ Index closest_cell(const Matter& matter, const Vectors& positions, const Vec3f& 
         closest = cell;
     }
     return closest;
+}
+
+/// Where cells are inverted or flat: the place by the linear map of the cell around that it is the least outside of.
+bool locate_roughly(const Matter& matter, const Vectors& positions, const Vec3f& point, Index around,
+                    Matter::Place& place, Mat3f& inverse) {
+    constexpr float kFlat = 0.2f, kFarthest = 1.5f; // of a cell's volume; cells from its middle
+    float least = kFarthest;
+    const auto& at = matter.body().cells.cells[around];
+    for (int n = 0; n < 27; ++n) {
+        const Index cell = matter.cell_at(at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1);
+        if (cell == kNoIndex || !(matter.volume_ratio(positions, cell) > kFlat)) continue;
+        const Matter::Linear map = matter.linear(positions, cell);
+        const Vec3f local = map.local(point);
+        const float outside = (local - Vec3f::Constant(0.5f)).cwiseAbs().maxCoeff();
+        if (!(outside < least)) continue;
+        least = outside;
+        place = {cell, local};
+        inverse = map.inverse;
+    }
+    return least < kFarthest;
 }
 
 /// Whether a place is within a cell, or nearly.
@@ -115,7 +135,11 @@ ContactReport FeatureContacts::add_forces(std::span<BodyState> bodies, std::span
             (poses.at(near.obstacle) * point_of(edge, near.part, parts_of(edge, spacing))).cast<float>();
         Matter::Place place{near.cell, near.local};
         Mat3f inverse;
-        if (!of.locate(body.positions, point, place, inverse) || !is_in_matter(of, place)) {
+        const bool is_found =
+            of.locate(body.positions, point, place, inverse)
+                ? is_in_matter(of, place)
+                : !of.is_rigid() && locate_roughly(of, body.positions, point, near.cell, place, inverse);
+        if (!is_found) {
             near.clear_until = way + 0.05f * float(spacing);
             continue;
         }
@@ -124,9 +148,9 @@ ContactReport FeatureContacts::add_forces(std::span<BodyState> bodies, std::span
         const Vec3f velocity = poses.velocity(near.obstacle, point) - of.mean(place, body.velocities);
         // Where it came in, if it came so far in this step that the closest surface may be another one.
         Vec3f entry = Vec3f::Zero();
-        if (velocity.norm() * dt > 0.25f * float(spacing))
-            entry = -(inverse * velocity).normalized();
+        if (velocity.norm() * dt > 0.25f * float(spacing)) entry = -(inverse * velocity).normalized();
         const std::optional<Matter::Depth> depth = of.depth(place, inverse, entry);
+        if (!of.is_rigid()) place.local = place.local.cwiseMax(0).cwiseMin(1); // what carries it
         const float deep = depth ? depth->depth - kFree * float(spacing) : 0;
         if (!(deep > 0)) {
             near.clear_until = way + (depth ? -0.5f * deep : 0.05f * float(spacing));
@@ -175,7 +199,7 @@ bool FeatureContacts::is_sound(std::span<const Near> near, std::span<const BodyS
                                std::span<const ObstacleShape> shapes, const MatterContacts& matter) const {
     return std::ranges::all_of(near, [&](const Near& at) {
         return at.body < bodies.size() && at.obstacle < shapes.size() && matter.has_matter(at.body) &&
-               at.edge < shapes[at.obstacle].sharp_edges().size() && at.part <= kMostParts &&
+               at.edge < shapes[at.obstacle].sharp_edges().size() && at.part <= kMostEdgeParts &&
                at.cell < bodies[at.body].body->cells.cells.size() && at.local.allFinite() &&
                std::isfinite(at.clear_until);
     });

@@ -11,14 +11,14 @@ namespace filigree {
 
 namespace {
 
-constexpr double kMargin = 1e-9;           // of the largest coordinate: rounding of doubles is far below it
-constexpr std::size_t kFewTriangles = 32;  // to try all of them
-constexpr double kPieceEdges = 4;          // a long way is looked at in pieces of so many edges
+constexpr double kWallMargin = 1e-9;      // of the largest coordinate: rounding of doubles is far below it
+constexpr std::size_t kFewTriangles = 32; // to try all of them
+constexpr double kPieceEdges = 4;         // a long way is looked at in pieces of so many edges
 constexpr double kMostWayPieces = 256;
-constexpr double kStraight = 0.85; ///< cosine: faces that bend less at an edge go on
-constexpr double kSpike = 0.75;    ///< length of the mean of unit ways along a tip's edges; more is sharp
-constexpr int kMostSlides = 8;             // along the walls, one way after the other
-constexpr std::size_t kMostPlanes = 6;     // that bound one way
+constexpr double kStraight = 0.85;     ///< cosine: faces that bend less at an edge go on
+constexpr double kSpike = 0.75;        ///< length of the mean of unit ways along a tip's edges; more is sharp
+constexpr int kMostSlides = 8;         // along the walls, one way after the other
+constexpr std::size_t kMostPlanes = 6; // that bound one way
 
 /// Half-spaces that a place has to stay in.
 class WallPlanes {
@@ -131,8 +131,8 @@ ObstacleSurface::ObstacleSurface(const Cuboid& box) : is_closed_(true) {
         const Vec3d side(corner & 1 ? 0.5 : -0.5, corner & 2 ? 0.5 : -0.5, corner & 4 ? 0.5 : -0.5);
         positions_.push_back((box.centre + side.cwiseProduct(box.size)).cast<float>());
     }
-    for (const std::array<Index, 4>& f : {std::array<Index, 4>{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3},
-                                          {0, 2, 3, 1}, {4, 5, 7, 6}}) {
+    for (const std::array<Index, 4>& f :
+         {std::array<Index, 4>{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}}) {
         triangles_.push_back({f[0], f[1], f[2]});
         triangles_.push_back({f[0], f[2], f[3]});
     }
@@ -152,7 +152,7 @@ void ObstacleSurface::prepare() {
             box_.extend(positions_[v].cast<double>());
             largest = std::max(largest, double(positions_[v].cwiseAbs().maxCoeff()));
         }
-    margin_ = kMargin * largest;
+    margin_ = kWallMargin * largest;
     for (Index t = 0; t < triangles_.size(); ++t) {
         const auto [a, b, c] = corners(t);
         const Vec3d normal = (b - a).cross(c - a), unit = normal.stableNormalized();
@@ -180,9 +180,8 @@ void ObstacleSurface::find_sharp_edges() {
         }
     std::ranges::sort(sides);
     for (auto first = sides.begin(); first != sides.end();) {
-        const auto last = std::find_if(first, sides.end(), [&](const Side& side) {
-            return side.low != first->low || side.high != first->high;
-        });
+        const auto last = std::find_if(
+            first, sides.end(), [&](const Side& side) { return side.low != first->low || side.high != first->high; });
         const Vec3d from = positions_[first->low].cast<double>(), to = positions_[first->high].cast<double>();
         const auto inwards = [&](const Side& side) -> Vec3d { // from the edge into its face
             const std::array<Vec3d, 3> of = corners(side.triangle);
@@ -229,14 +228,15 @@ void ObstacleSurface::each_near(const Vec3d& point, double radius, const Visit& 
     for (Index t = 0; t < triangles_.size(); ++t) visit(t);
 }
 
-/// Whether a point, moved along the triangle's normal, comes to lie in it; or by the margin beside it.
+/// Whether a point, moved along the triangle's normal, comes to lie in it; or a quarter of the margin beside it, so
+/// that nothing slips through between two, and places that go over an edge do not catch on the wall below it.
 bool ObstacleSurface::is_over(Index triangle, const Vec3d& point) const {
     const std::array<Vec3d, 3> of = corners(triangle);
     const Vec3d& normal = planes_[triangle].normal;
     for (std::size_t k = 0; k < 3; ++k) {
         const Vec3d edge = of[(k + 1) % 3] - of[k];
         const double within = normal.cross(edge).dot(point - of[k]);
-        if (within < 0 && within * within > margin_ * margin_ * edge.squaredNorm()) return false;
+        if (within < 0 && within * within > 0.0625 * margin_ * margin_ * edge.squaredNorm()) return false;
     }
     return true;
 }
@@ -323,7 +323,8 @@ ClosestWall ObstacleSurface::closest(const Vec3d& point, double reach) const {
         for (Index t = 0; t < triangles_.size(); ++t) take(t);
     }
     if (found.triangle == kNoIndex) return found;
-    // Each triangle counts by the angle under which the point sees it: a face by 2 pi, an edge by pi, a corner by its own.
+    // Each triangle counts by the angle under which the point sees it: a face by 2 pi, an edge by pi, a corner by its
+    // own.
     const double beside = 1e-6 * (edge_ + found.position.cwiseAbs().maxCoeff());
     each_near(found.position, beside, [&](Index triangle) {
         if (!std::isfinite(planes_[triangle].at)) return;

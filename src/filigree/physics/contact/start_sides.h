@@ -32,7 +32,6 @@ private:
     Eigen::Isometry3d to_own_;
 };
 
-
 /// Cost O(bodies * obstacles), and O(points log F) for those near each other.
 std::vector<StartOverlap> find_start_overlaps(const World& world, std::span<const BodyState> bodies);
 

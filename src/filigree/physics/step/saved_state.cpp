@@ -11,7 +11,8 @@ namespace {
 
 // The name of the format, its version last. A: from which side points touch obstacles.
 constexpr std::uint64_t kMagic = 0x41455441'54534c46; // "FLSTATEA"
-static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f) + sizeof(Vec3d), "padding would be saved");
+static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f) + sizeof(Vec3d),
+              "padding would be saved");
 static_assert(sizeof(FeatureContacts::Near) == 6 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(Contacts::BallMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(MatterContacts::SideMemory) == 6 * sizeof(Index), "padding would be saved");

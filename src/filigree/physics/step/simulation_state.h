@@ -30,7 +30,7 @@ struct SimulationState {
     std::vector<BodyState> bodies;      ///< of the actors, then pieces
     std::vector<std::string> why_rigid; ///< of each actor: Simulation::why_rigid
     std::vector<StartOverlap> start_overlaps;
-    std::vector<Cracks> cracks;         ///< of bodies that break
+    std::vector<Cracks> cracks; ///< of bodies that break
     Contacts contacts;
     ExternalForces external;
     std::unique_ptr<mpm::Bodies> grid; ///< of bodies of mpm; never null
