@@ -5,10 +5,10 @@
 
 namespace filigree {
 
+namespace obstacle_contact {
+
 using namespace obstacle_meshes;
 using namespace simulation_scenes;
-
-namespace obstacle_contact {
 
 constexpr double kRadius = 0.1;
 

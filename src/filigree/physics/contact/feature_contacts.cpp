@@ -105,19 +105,18 @@ void FeatureContacts::search(std::span<const BodyState> bodies, std::span<const 
     near_ = std::move(found);
 }
 
-/// N/m of a point in a cell: as surface points have, and no more than the cell's corners follow.
+/// N/m of a point in a cell: about as surface points have, and no more than the cell's corners follow.
 float FeatureContacts::stiffness(const BodyState& body, const Matter& matter, const Matter::Place& place) const {
     if (body.surface_stiffness.empty()) return 0;
-    float mean = 0;
-    for (const float of_point : body.surface_stiffness) mean += of_point;
-    mean /= float(body.surface_stiffness.size());
-    if (matter.is_rigid()) return mean;
+    if (matter.is_rigid()) return body.surface_stiffness.front();
+    const double modulus = body.body->material.density * std::pow(pressure_wave_speed(body.body->material), 2);
+    float stiffness = float(modulus * body.body->spacing());
     const Matter::Weights weights = matter.weights(place);
     for (int c = 0; c < 8; ++c)
         if (const float weight = std::abs(weights[c]); weight > 1e-3f)
-            mean = std::min(mean, kShareOfPoints * kContactShare * body.rest_squared_frequency *
-                                      body.body->mass[matter.corners(place.cell)[c]] / weight);
-    return mean;
+            stiffness = std::min(stiffness, kShareOfPoints * kContactShare * body.rest_squared_frequency *
+                                                body.body->mass[matter.corners(place.cell)[c]] / weight);
+    return stiffness;
 }
 
 ContactReport FeatureContacts::add_forces(std::span<BodyState> bodies, std::span<const ObstacleShape> shapes,
