@@ -48,6 +48,14 @@ Index closest_cell(const Matter& matter, const Vectors& positions, const Vec3f& 
     return closest;
 }
 
+/// Whether an edge sticks out to the side that a body lies on: close to it, towards the body, the edge itself is the
+/// closest of the obstacle. The edges of a room stick out to nobody in it.
+bool sticks_out(const ObstacleShape& shape, const Vec3d& point, const Vec3d& body_centre, double spacing) {
+    constexpr double kClose = 0.05, kItself = 0.9;
+    const double close = kClose * spacing;
+    return shape.clearance(point + close * (body_centre - point).normalized(), close) > kItself * close;
+}
+
 /// Where cells are inverted or flat: the place by the linear map of the cell around that it is the least outside of.
 bool locate_roughly(const Matter& matter, const Vectors& positions, const Vec3f& point, Index around,
                     Matter::Place& place, Mat3f& inverse) {
@@ -95,7 +103,9 @@ void FeatureContacts::search(std::span<const BodyState> bodies, std::span<const 
                 const Index parts = parts_of(edges[e], spacing);
                 const auto [first, last] = parts_within(edges[e], parts, centre, radius);
                 for (Index part = first; part <= last && first <= last; ++part) {
-                    const Vec3f point = (poses.at(o) * point_of(edges[e], part, parts)).cast<float>();
+                    const Vec3d own = point_of(edges[e], part, parts);
+                    if (!sticks_out(shapes[o], own, centre, spacing)) continue;
+                    const Vec3f point = (poses.at(o) * own).cast<float>();
                     const Index cell = closest_cell(matter.matter(b), body.positions, point);
                     found.push_back({b, o, e, part, cell, Vec3f::Constant(0.5f), 0});
                 }
@@ -173,7 +183,8 @@ ContactReport FeatureContacts::add_forces(std::span<BodyState> bodies, std::span
         ++report.contacts;
         report.deepest = std::max(report.deepest, deep);
         if (deep > deepest)
-            deep_.push_back({near.body, place, depth->normal, poses.velocity(near.obstacle, point), deep - deepest});
+            deep_.push_back({near.body, place, depth->normal, poses.velocity(near.obstacle, point),
+                             std::min(deep - deepest, float(spacing))});
     }
     return report;
 }
