@@ -101,12 +101,25 @@ std::vector<Named> thin_things() {
             {"a thin cuboid", of_box({0, 0, 0}, {2, 0.001, 2})}};
 }
 
+/// Soft bodies that are crushed take thousands of substeps a frame: those meet fewer things, and less fast.
+std::vector<Named> thin_things_for(MaterialModel model) {
+    std::vector<Named> all = thin_things();
+    if (model == MaterialModel::rigid) return all;
+    if (model == MaterialModel::fem) return {all[0], all[4], all[6]};
+    return {all[4]};
+}
+std::vector<double> speeds_for(MaterialModel model) {
+    if (model == MaterialModel::rigid) return {1, 36, 1000};
+    if (model == MaterialModel::fem) return {1, 36, 100};
+    return {36};
+}
+
 TEST_P(EachModel, ThinThingsStopFromBothSidesAtAnySpeed) {
     const auto body = ball_of(GetParam());
-    for (const auto& [name, obstacle] : thin_things())
+    for (const auto& [name, obstacle] : thin_things_for(GetParam()))
         for (const double side : {1.0, -1.0})
-            for (const double speed : {1.0, 36.0, 1000.0}) {
-                if (speed != 36 && side < 0) continue; // they take long
+            for (const double speed : speeds_for(GetParam())) {
+                if (speed != 36 && side < 0) continue;
                 Simulation sim =
                     simulation(world_with({obstacle}),
                                {thrown(body, {0.03, side * 0.25, -0.02}, {0, -side * speed, 0})}, kExplicit);
@@ -120,7 +133,7 @@ TEST_P(EachModel, ThinThingsStopFromBothSidesAtAnySpeed) {
 
 TEST_P(EachModel, WhatLiesOnThinThingsStaysThere) {
     const auto body = ball_of(GetParam());
-    for (const auto& [name, obstacle] : thin_things()) {
+    for (const auto& [name, obstacle] : thin_things_for(GetParam())) {
         Simulation sim = simulation(world_with({obstacle}, 9.81), {actor(body, {0.03, kRadius, 0.02})}, kExplicit);
         run(sim, 60);
         EXPECT_NEAR(centre_of(sim).y(), kRadius, 0.025) << name;
@@ -131,6 +144,7 @@ TEST_P(EachModel, TerrainHoldsEitherWayRound) {
     const auto body = ball_of(GetParam());
     for (const bool turned : {false, true})
         for (const Vec3d& at : {Vec3d(0, 0.6, 0), Vec3d(1.2, 0.8, -0.7), Vec3d(-1, 0.5, 0.4)}) {
+            if (at.x() != 0 && GetParam() != MaterialModel::rigid) continue; // they take long
             const Mesh mesh = turned ? turned_over(terrain(40)) : terrain(40);
             Simulation sim = simulation(world_with({of_mesh(mesh)}, 9.81), {actor(body, at)}, kExplicit);
             expect_always(sim, 90, turned ? "turned" : "as it is", [&](const Vec3d& centre) {
@@ -150,7 +164,8 @@ TEST_P(EachModel, RoomsKeepWhatIsInThem) {
                                       {"thin walls", of_mesh(thick_shell(0.5f, 0.001f))}};
     for (const auto& [name, room] : rooms)
         for (const Vec3d& velocity : {Vec3d(0, 0, 0), Vec3d(30, 20, 0), Vec3d(-200, 300, 150)}) {
-            if (velocity.z() != 0 && name != rooms.front().name && name != rooms.back().name)
+            const bool is_rigid = GetParam() == MaterialModel::rigid;
+            if (!is_rigid && (velocity.z() != 0 || (name != rooms.front().name && name != rooms.back().name)))
                 continue; // they take long
             Simulation sim = simulation(world_with({room}, 9.81), {thrown(body, {0.05, 0.1, 0}, velocity)}, kExplicit);
             // What is crushed flat for a moment has corners of cells outside of its surface, so that the mean of all
@@ -209,8 +224,8 @@ TEST_P(EachModel, TunnelsTraysStairsAndWedgesHold) {
 /// A sheet that sweeps over what rests takes it along.
 TEST_P(EachModel, MovingThinThingsPushWhatRests) {
     const auto body = ball_of(GetParam());
-    for (const auto& [name, thing] : thin_things())
-        for (const double speed : {1.0, 30.0, 300.0}) {
+    for (const auto& [name, thing] : thin_things_for(GetParam()))
+        for (const double speed : speeds_for(GetParam())) {
             Obstacle obstacle = thing;
             const double seconds = 0.8 / speed;
             obstacle.motion.move = {{0, seconds}, {Vec3d(0, 0.3, 0), Vec3d(0, -0.5, 0)}, Vec3d::Zero()};
@@ -242,7 +257,7 @@ TEST_P(EachModel, SpheresAndCuboidsStopAtAnySpeed) {
     Obstacle globe;
     globe.shape = Ball{{0, -0.3, 0}, 0.3};
     for (const Obstacle& obstacle : {globe, of_box({0, -0.05, 0}, {2, 0.1, 2}), of_box({0, -5, 0}, {20, 10, 20})})
-        for (const double speed : {1.0, 36.0, 1000.0}) {
+        for (const double speed : speeds_for(GetParam())) {
             Simulation sim =
                 simulation(world_with({obstacle}), {thrown(body, {0, 0.25, 0}, {0, -speed, 0})}, kExplicit);
             expect_always(sim, int(std::clamp(30 / speed, 5.0, 30.0)), std::to_string(speed),

@@ -15,9 +15,17 @@ namespace {
 
 constexpr double kCorrected = 0.2;       ///< part of a penetration that a substep takes away ...
 constexpr double kFastestCorrection = 3; ///< m/s: ... no faster than this
+constexpr double kDeep = 0.5;            ///< spacings; deeper there is no such limit
 constexpr double kSlop = 2e-3;           ///< spacings of penetration that are left, so that what rests keeps touching
 constexpr std::size_t kFewestSweeps = 10, kMostSweeps = 400, kMostRowsSwept = 40000;
 constexpr double kStill = 1e-4; ///< of what gravity adds in a substep: a smaller change of velocity ends the sweeps
+
+/// m/s that take a part of a penetration away in dt. What came deep into an obstacle, faster than a substep can see, is
+/// out soon.
+double correction(double depth, double spacing, bool in_obstacle, double dt) {
+    const double wanted = kCorrected * std::max(0.0, depth - kSlop * spacing) / dt;
+    return in_obstacle && depth > kDeep * spacing ? wanted : std::min(kFastestCorrection, wanted);
+}
 
 } // namespace
 
@@ -154,10 +162,9 @@ void RigidContacts::solve(std::span<BodyState> bodies, double dt) {
     }
     for (std::size_t k = 0; k < rows_.size(); ++k) {
         Row& row = rows_[k];
-        const double slop = kSlop * bodies[points_[k].body].body->spacing();
-        row.target = row.separation > 0
-                         ? -row.separation / dt
-                         : std::min(kFastestCorrection, kCorrected * std::max(0.0, -row.separation - slop) / dt);
+        row.target = row.separation > 0 ? -row.separation / dt
+                                        : correction(-row.separation, bodies[points_[k].body].body->spacing(),
+                                                     points_[k].other == kNoIndex, dt);
         const Vec3d before = dt * points_[k].force->cast<double>();
         row.impulse = std::max(0.0, before.dot(row.normal));
         for (int t = 0; t < 2; ++t) row.tangent_impulses[t] = before.dot(row.tangents[t]);
