@@ -1,7 +1,7 @@
 // Bodies that break: what holds pieces, when it lets go, and what is kept.
 #include "filigree/core/random.h"
 #include "filigree/mesh/shapes.h"
-include "filigree/physics/body/elasticity.h"
+#include "filigree/physics/body/elasticity.h"
 #include "filigree/physics/simulation.h"
 #include "test_bodies.h"
 #include "threads.h"

@@ -199,6 +199,19 @@ bool is_finite(const SimulationState& state) {
         state.bodies, [](const BodyState& body) { return is_finite(body.positions) && is_finite(body.velocities); });
 }
 
+/// Where plastic strain has come to its limit.
+void note_flow(const SimulationState& state, FrameReport& report) {
+    std::size_t most = 0;
+    for (const BodyState& body : state.bodies) {
+        if (body.is_absent) continue;
+        const std::size_t count = body.elasticity->flowed_out();
+        report.flowed_out += count;
+        if (count <= most) continue;
+        most = count;
+        report.most_flowed = body.actor;
+    }
+}
+
 /// One frame, whatever way it takes. Cancelled work leaves the state half done.
 Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, const RunContext& context) {
     const double from = state.time(), until = double(state.frame + 1) * state.frame_seconds();
@@ -244,6 +257,7 @@ Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, 
     hold_lost();
     report.clamped_particles += held;
     report.most_crushed = state.bodies[report.most_crushed].actor;
+    note_flow(state, report);
     for (const Cracks& cracks : state.cracks) cracks.show_whole(state.bodies);
     let_rest(state, from, until);
     ++state.frame;
@@ -459,7 +473,7 @@ std::size_t Simulation::attach_on_grid(std::size_t body, std::span<const Vec3f> 
     std::vector<Mat3f> gradients(points.size());
     fit_embedded(around, state.body->rest, state.positions, places, gradients, context);
     state_->first_tracers.push_back(state_->grid->add_tracers(body, places, gradients));
-    state_->attachments.push_back({body, {points.begin(), points.end()}, {}, {}});
+    state_->attachments.push_back({body, {points.begin(), points.end()}, {}});
     state_->followers.emplace_back();
     return state_->attachments.size() - 1;
 }

@@ -55,10 +55,17 @@ struct Crush {
     float least = 1;                    ///< volume of a cell, of that at rest
 };
 
+/// Cells or particles that have come to the limit of plastic strain.
+struct FlowedOut {
+    std::uint64_t first = 0; ///< frame
+    std::uint64_t most = 0;  ///< of them
+};
+
 /// What makes a body's motion doubtful.
 struct BodyDoubts {
     std::optional<std::uint64_t> first_lost; ///< the first frame in which hold_lost held some
     std::optional<Crush> crush;
+    std::optional<FlowedOut> flowed_out;
 };
 
 struct Recording {

@@ -43,8 +43,12 @@ void write_doubts(ByteWriter& out, const Recording& recording) {
     out.value(recording.last_volume_ratio);
     for (const BodyDoubts& body : recording.doubts) {
         const Crush crush = body.crush.value_or(Crush{});
-        out.value(std::uint64_t(body.first_lost.has_value()) + 2 * std::uint64_t(body.crush.has_value()));
-        for (const std::uint64_t frame : {body.first_lost.value_or(0), crush.first, crush.worst}) out.value(frame);
+        const FlowedOut flowed = body.flowed_out.value_or(FlowedOut{});
+        out.value(std::uint64_t(body.first_lost.has_value()) + 2 * std::uint64_t(body.crush.has_value()) +
+                  4 * std::uint64_t(body.flowed_out.has_value()));
+        for (const std::uint64_t number :
+             {body.first_lost.value_or(0), crush.first, crush.worst, flowed.first, flowed.most})
+            out.value(number);
         out.value(crush.least);
     }
 }
@@ -58,11 +62,14 @@ void read_doubts(ByteReader& in, std::size_t bodies, Recording& recording) {
         const auto flags = in.value<std::uint64_t>();
         const auto first_lost = in.value<std::uint64_t>();
         Crush crush;
-        for (std::uint64_t* frame : {&crush.first, &crush.worst}) *frame = in.value<std::uint64_t>();
+        FlowedOut flowed;
+        for (std::uint64_t* number : {&crush.first, &crush.worst, &flowed.first, &flowed.most})
+            *number = in.value<std::uint64_t>();
         crush.least = in.value<float>();
         BodyDoubts& body = recording.doubts.emplace_back();
         if (flags & 1) body.first_lost = first_lost;
         if (flags & 2) body.crush = crush;
+        if (flags & 4) body.flowed_out = flowed;
     }
 }
 

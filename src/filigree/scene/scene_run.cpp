@@ -127,6 +127,7 @@ Status SceneRun::advance_to(std::uint64_t last, const RunContext& context) {
         recording_.descent_causes.add(*report);
         recording_.last_volume_ratio = report->least_volume_ratio;
         note_crush(*report);
+        note_flow(*report);
         for (std::size_t b = 0; b < followers_.size(); ++b)
             if (const Status recorded = record_body(b); !recorded) return recorded;
     }
@@ -182,6 +183,13 @@ void SceneRun::note_crush(const FrameReport& report) {
     crush->worst = frame();
 }
 
+void SceneRun::note_flow(const FrameReport& report) {
+    if (report.flowed_out == 0) return;
+    std::optional<FlowedOut>& flowed = recording_.doubts[report.most_flowed].flowed_out;
+    if (!flowed) flowed = FlowedOut{.first = frame()};
+    flowed->most = std::max(flowed->most, std::uint64_t{report.flowed_out});
+}
+
 void SceneRun::check_body(std::size_t b) {
     const ReadyBody& body = ready_->bodies[b];
     const Follower& follower = followers_[b];
@@ -222,6 +230,12 @@ std::vector<std::string> SceneRun::warnings() const {
             sentences.push_back(fmt::format("body '{}': cells were crushed to {} of their volume in frame {}, first "
                                             "below a tenth in frame {}: what follows may be wrong",
                                             name, volume_text(crush->least), crush->worst, crush->first));
+        if (const std::optional<FlowedOut>& flowed = recording_.doubts[b].flowed_out)
+            sentences.push_back(
+                fmt::format("body '{}': {} of its cells or particles flowed to seven times their length, "
+                            "first in frame {}, and are elastic from there on; model = \"mpm\" is for "
+                            "matter that flows so far",
+                            name, with_commas(flowed->most), flowed->first));
     }
     if (recording_.last_volume_ratio <= 0)
         sentences.push_back("some cells are inside out at the end: the bodies were pressed or pulled too hard");

@@ -55,6 +55,7 @@ private:
     void hold_lost_of(std::size_t body);
     void check_body(std::size_t body);
     void note_crush(const FrameReport& report);
+    void note_flow(const FrameReport& report);
     bool is_left_alone() const;
     std::optional<std::string> energy_warning() const;
     std::optional<std::string> descent_warning() const;

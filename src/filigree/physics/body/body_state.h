@@ -52,7 +52,7 @@ struct BodyState {
     std::vector<LightCorner> light_corners;
 
     // Contact: points of the surface; meshfree bodies touch each other by balls just below them.
-    Embedding surface, balls; ///< in the elasticity's reference
+    Embedding surface, balls;
     /// Of each surface point, N/m: that of a spacing's depth of material under the point's area, bounded so that all
     /// points together add no more than kContactShare times the body's own squared frequency to any particle.
     std::vector<float> surface_stiffness;
@@ -60,11 +60,6 @@ struct BodyState {
     bool has_balls() const { return balls.size() != 0; }
     std::vector<std::uint8_t> hidden; ///< 1: a surface point on a crack that has not opened; empty: none
     bool is_hidden(std::size_t point) const { return !hidden.empty() && hidden[point]; }
-
-    /// Gradients from the body at rest to the elasticity's reference, one a particle: how matter has flowed until
-    /// neighbourhoods were last renewed. Empty: never; the reference is the body at rest.
-    std::vector<Mat3f> flow;
-    bool has_flowed() const { return !flow.empty(); }
 };
 
 /// Of each corner, whether its cells are hardly filled. Such corners fly to and fro beside the rest at ten times its
@@ -83,24 +78,11 @@ void each_copy(std::span<State> bodies, std::size_t body, Index particle, const 
         visit(bodies[whole.first_piece + copy.piece], whole.first_piece + copy.piece, copy.corner);
 }
 
-/// Points of the body at rest, where they are in the elasticity's reference.
-struct PlacedPoints {
-    std::vector<Vec3f> places;
-    std::vector<Mat3f> gradients; ///< from rest to there, stretches within 1/4 and 4; empty: the body has not flowed
-};
-
-/// The door for all that is given as a point of the body at rest. A point goes with the particles that were around it
-/// at rest, or where these have come apart with the nearest of them.
-PlacedPoints place_in_reference(const BodyState& state, std::span<const Vec3f> rest_points, const RunContext& context);
-/// The same for the surface's points: their gradients alone, one at a time.
-Mat3f surface_flow(const BodyState& state, std::size_t point);
-
-/// Where points were put that others asked to be carried along.
+/// Points that others asked to be carried along.
 struct Attachment {
     std::size_t body = 0;
-    std::vector<Vec3f> points;    ///< of the body at rest
-    Embedding embedding;          ///< of the points where they are in the elasticity's reference
-    std::vector<Mat3f> gradients; ///< from rest to there; empty: the body had not flowed
+    std::vector<Vec3f> points; ///< of the body at rest
+    Embedding embedding;
 };
 Attachment attach(const BodyState& state, std::size_t body, std::span<const Vec3f> rest_points,
                   const RunContext& context);
@@ -108,11 +90,9 @@ Attachment attach(const BodyState& state, std::size_t body, std::span<const Vec3
 void move_attached(const BodyState& state, const Attachment& attachment, std::span<Vec3f> points,
                    std::span<Mat3f> gradients, const RunContext& context);
 
-/// Renews the elasticity's neighbourhoods where the particles are now; what is embedded in the body stays where it is.
-void renew_neighbourhoods(BodyState& state, std::span<Attachment* const> attachments, const RunContext& context);
-/// The surface's points and balls as they are on a body that has not flowed.
+/// The surface's points and balls.
 void embed_surface_at_rest(BodyState& state, bool with_balls, const RunContext& context);
-/// For the particles that carry the surface's points now; not of a rigid body.
+/// Not of a rigid body.
 void set_surface_stiffness(BodyState& state);
 
 Box box_of(const Vectors& positions); ///< at least one, all finite

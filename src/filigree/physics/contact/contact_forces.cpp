@@ -257,7 +257,7 @@ void Contacts::push_particles_out(BodyState& body, std::size_t obstacle, const V
     parallel_for(context, found.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             found[i] = poses.distance_to(obstacle, body.positions[i]);
-            found[i].distance += body.has_flowed() ? kDeepest * float(body.body->spacing()) : most_depths[i];
+            found[i].distance += most_depths[i];
         }
     });
     for (Index i = 0; i < found.size(); ++i) {

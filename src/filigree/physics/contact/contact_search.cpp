@@ -161,9 +161,7 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float reach, const 
     }
 }
 
-/// Once matter has flowed, cells at rest do not say any more what belongs together, and it does not meet itself.
 void Contacts::find_own_pairs(const BodyState& body, Index number, const Vectors& balls, float reach) {
-    if (body.has_flowed()) return;
     const PairContact law = matter_.laws().of(body.actor, body.actor);
     const float touch = 2 * body.ball_radius;
     for (const auto& [s, t] : own_balls_[number]->cells.near_points(balls, touch + reach))

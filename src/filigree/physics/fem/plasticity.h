@@ -2,15 +2,25 @@
 #pragma once
 
 #include "filigree/core/types.h"
+#include "filigree/physics/material.h"
 
 namespace filigree {
 
 struct FlowLaw {
     float yield_strain; ///< of |dev log s|: sqrt(2/3) yield stress / (2 mu); infinite: no yield
     float yield_rate;   ///< part of the excess that flows off: 1 - exp(-dt / creep time); 1 at once
-    float relaxation;   ///< part of all deviatoric strain that flows off, of melts: 1 - exp(-dt mu / viscosity)
     float beside = 0;   ///< squared strain that the gradient does not show, which yields along with it
 };
+/// Of a material that yields, over dt seconds.
+FlowLaw yield_law(const Material& material, float dt);
+
+/// Cells and particles below this part of their volume do not yield.
+inline constexpr float kLeastYielding = 0.1f;
+/// |D|^2 of the inverse of a plastic gradient beyond which nothing flows further, so that what was stretched to seven
+/// times its length is elastic from there on: neighbours at rest say less and less of what is near.
+inline constexpr float kMostFlowed = 50;
+/// Whether D has all but come to that limit.
+inline bool has_flowed_out(const Mat3f& inverse) { return inverse.squaredNorm() > 0.9f * kMostFlowed; }
 
 /// Eigenvalues (not sorted) and unit eigenvectors (columns) of a symmetric matrix by Jacobi rotations; the same bytes
 /// everywhere. Not for matrices with infinite entries.

@@ -22,7 +22,7 @@ struct Grip {
     Vec3f target(double time) const { return hand.target.at(time).cast<float>() - offset; }
 };
 
-/// hand.point goes through place_in_reference: the particles that were there at rest are seized, wherever they are now.
+/// The particles around hand.point at rest are seized, wherever they are now.
 Grip make_grip(const Hand& hand, const BodyState& body, const RunContext& context);
 
 class ExternalForces {

@@ -9,8 +9,8 @@ namespace filigree {
 
 namespace {
 
-// The name of the format, its version last. 9: what it was made for.
-constexpr std::uint64_t kMagic = 0x39455441'54534c46; // "FLSTATE9"
+// The name of the format, its version last. A: meshfree bodies touch as others do.
+constexpr std::uint64_t kMagic = 0x41455441'54534c46; // "FLSTATEA"
 static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(Contacts::BallMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(MatterContacts::SideMemory) == 6 * sizeof(Index), "padding would be saved");
@@ -46,15 +46,6 @@ void write_body(ByteWriter& writer, const SavedBody& body) {
     writer.vectors(body.velocities);
     writer.array(std::span(body.elasticity));
     write_pose(writer, body.rigid);
-    writer.array(std::span(body.flow));
-    if (body.flow.empty()) return;
-    writer.array(std::span(body.surface));
-    writer.array(std::span(body.balls));
-    writer.value(std::uint64_t(body.attachments.size()));
-    for (const SavedPoints& points : body.attachments) {
-        writer.array(std::span(points.places));
-        writer.array(std::span(points.gradients));
-    }
 }
 
 SavedBody read_body(ByteReader& reader) {
@@ -65,15 +56,6 @@ SavedBody read_body(ByteReader& reader) {
     const std::vector<char> elasticity = reader.array<char>();
     body.elasticity.assign(elasticity.begin(), elasticity.end());
     body.rigid = read_pose(reader);
-    body.flow = reader.array<Mat3f>();
-    if (body.flow.empty()) return body;
-    body.surface = reader.array<Vec3f>();
-    body.balls = reader.array<Vec3f>();
-    body.attachments.resize(reader.count(2 * sizeof(std::uint64_t)));
-    for (SavedPoints& points : body.attachments) {
-        points.places = reader.array<Vec3f>();
-        points.gradients = reader.array<Mat3f>();
-    }
     return body;
 }
 
