@@ -16,8 +16,6 @@ namespace filigree {
 
 namespace {
 
-constexpr float kBallRadius = 0.4f; ///< spacings
-
 Error usage(std::string sentence) { return {ErrorCode::usage, std::move(sentence)}; }
 
 Status check_options(const StepOptions& options) {
@@ -47,7 +45,7 @@ BodyState place_body(const Actor& actor, std::size_t number) {
     return state;
 }
 
-BodyState begin_body(const Actor& actor, std::size_t number, bool with_balls, const RunContext& context) {
+BodyState begin_body(const Actor& actor, std::size_t number, const RunContext& context) {
     BodyState state = place_body(actor, number);
     const Body& body = *actor.body;
     const std::size_t count = body.particle_count();
@@ -63,8 +61,8 @@ BodyState begin_body(const Actor& actor, std::size_t number, bool with_balls, co
         state.rest_squared_frequency = kRigidSquaredFrequency;
         state.surface_stiffness = rigid_surface_stiffness(state);
     }
-    state.ball_radius = kBallRadius * float(body.spacing());
-    embed_surface_at_rest(state, with_balls && body.material.model == MaterialModel::meshfree, context);
+    state.surface = body.surface.points;
+    if (body.corners.size() != 0) state.corners.emplace(body.corners, count);
     if (!state.rigid) set_surface_stiffness(state);
     return state;
 }
@@ -125,8 +123,6 @@ private:
 
 void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunContext& context) {
     AutomaticRigid automatic(state.world, state.options, actors);
-    const bool with_balls =
-        state.options.contacts_within_bodies || (state.options.contacts_between_bodies && actors.size() > 1);
     for (Actor& actor : actors) {
         const std::size_t number = state.bodies.size();
         if (state.grid->has(number)) {
@@ -134,11 +130,11 @@ void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunC
             state.why_rigid.emplace_back();
             continue;
         }
-        BodyState body = begin_body(actor, number, with_balls, context);
+        BodyState body = begin_body(actor, number, context);
         state.why_rigid.push_back(automatic.reason(number, body));
         if (!state.why_rigid.back().empty()) {
             actor.body = automatic.rigid(actor.body);
-            body = begin_body(actor, number, with_balls, context);
+            body = begin_body(actor, number, context);
         }
         state.bodies.push_back(std::move(body));
     }
@@ -152,7 +148,7 @@ void begin_pieces(SimulationState& state, std::span<const Actor> actors, const R
         state.bodies[a].broken = actors[a].fracture->body;
         state.bodies[a].first_piece = first;
         for (const std::shared_ptr<const Body>& piece : actors[a].fracture->body->pieces) {
-            state.bodies.push_back(begin_body({piece, actors[a].placement}, a, false, context));
+            state.bodies.push_back(begin_body({piece, actors[a].placement}, a, context));
             state.bodies.back().is_absent = true;
             state.bodies.back().elasticity->prepare_blocks();
             find_light_corners(state.bodies.back());
@@ -320,6 +316,7 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
     begin_pins(*state);
     for (Cracks& cracks : state->cracks)
         if (!cracks.set_memory(cracks.memory(), state->bodies)) assert(false); // works out what follows from it
+    place_corners(state->bodies, context);
     state->contacts.begin(state->bodies);
     return Simulation(std::move(state));
 }

@@ -66,35 +66,28 @@ void set_surface_stiffness(BodyState& state) {
     stiffness.resize(state.surface.size());
     for (std::size_t s = 0; s < stiffness.size(); ++s)
         stiffness[s] = float(kSurfaceStiffness * modulus * double(body.surface.areas[s]) / body.spacing());
-    const auto bound = [&](const Embedding& points) {
-        const auto each_weight = [&](std::size_t point, const auto& visit) {
-            for (Index k = points.offsets[point]; k < points.offsets[point + 1]; ++k)
-                visit(points.particles[k], std::abs(points.weights[k]));
-        };
-        std::vector<double> sums(body.particle_count(), 0);
-        for (std::size_t s = 0; s < points.size(); ++s)
-            each_weight(s, [&](Index particle, float weight) { sums[particle] += double(weight * stiffness[s]); });
-        for (std::size_t s = 0; s < points.size(); ++s) {
-            double part = 1;
-            each_weight(s, [&](Index particle, float weight) {
-                if (weight > 0)
-                    part = std::min(part, double(kContactShare) * double(body.mass[particle]) *
-                                              double(state.rest_squared_frequency) / sums[particle]);
-            });
-            stiffness[s] *= float(part);
-        }
+    const Embedding& points = state.surface;
+    const auto each_weight = [&](std::size_t point, const auto& visit) {
+        for (Index k = points.offsets[point]; k < points.offsets[point + 1]; ++k)
+            visit(points.particles[k], std::abs(points.weights[k]));
     };
-    bound(state.surface);
+    std::vector<double> sums(body.particle_count(), 0);
+    for (std::size_t s = 0; s < points.size(); ++s)
+        each_weight(s, [&](Index particle, float weight) { sums[particle] += double(weight * stiffness[s]); });
+    for (std::size_t s = 0; s < points.size(); ++s) {
+        double part = 1;
+        each_weight(s, [&](Index particle, float weight) {
+            if (weight > 0)
+                part = std::min(part, double(kContactShare) * double(body.mass[particle]) *
+                                          double(state.rest_squared_frequency) / sums[particle]);
+        });
+        stiffness[s] *= float(part);
+    }
 }
 
-void embed_surface_at_rest(BodyState& state, bool with_balls, const RunContext& context) {
-    const Body& body = *state.body;
-    state.surface = body.surface.points;
-    if (!with_balls) return;
-    std::vector<Vec3f> points = body.surface.points.rest;
-    for (std::size_t s = 0; s < points.size(); ++s) points[s] -= state.ball_radius * body.surface.normals[s];
-    state.balls = body.material.model == MaterialModel::meshfree ? embed(points, body.rest, body.spacing(), context)
-                                                                 : embed_in_cells(points, body.cells, context);
+void place_corners(std::span<BodyState> bodies, const RunContext& context) {
+    for (BodyState& body : bodies)
+        if (body.corners) body.corners->place(body.positions, body.velocities, context);
 }
 
 Box box_of(const Vectors& positions) {

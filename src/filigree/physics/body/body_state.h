@@ -1,6 +1,7 @@
 // A body on its way: what the stepper and contacts change. Private to the layer.
 #pragma once
 
+#include "filigree/physics/body/contact_corners.h"
 #include "filigree/physics/body/elasticity.h"
 #include "filigree/physics/broken_body.h"
 
@@ -51,13 +52,16 @@ struct BodyState {
     };
     std::vector<LightCorner> light_corners;
 
-    // Contact: points of the surface; meshfree bodies touch each other by balls just below them.
-    Embedding surface, balls;
+    /// What contact sees of the cells: of meshfree bodies corners of their own, else the particles.
+    std::optional<ContactCorners> corners;
+    const Vectors& corner_positions() const { return corners ? corners->positions() : positions; }
+    const Vectors& corner_velocities() const { return corners ? corners->velocities() : velocities; }
+    Vectors& corner_forces() { return corners ? corners->forces() : forces; }
+
+    Embedding surface; ///< points that touch
     /// Of each surface point, N/m: that of a spacing's depth of material under the point's area, bounded so that all
     /// points together add no more than kContactShare times the body's own squared frequency to any particle.
     std::vector<float> surface_stiffness;
-    float ball_radius = 0; ///< m
-    bool has_balls() const { return balls.size() != 0; }
     std::vector<std::uint8_t> hidden; ///< 1: a surface point on a crack that has not opened; empty: none
     bool is_hidden(std::size_t point) const { return !hidden.empty() && hidden[point]; }
 };
@@ -90,8 +94,8 @@ Attachment attach(const BodyState& state, std::size_t body, std::span<const Vec3
 void move_attached(const BodyState& state, const Attachment& attachment, std::span<Vec3f> points,
                    std::span<Mat3f> gradients, const RunContext& context);
 
-/// The surface's points and balls.
-void embed_surface_at_rest(BodyState& state, bool with_balls, const RunContext& context);
+/// Where the particles have the corners of cells that are not particles. Cost O(particles of meshfree bodies).
+void place_corners(std::span<BodyState> bodies, const RunContext& context);
 /// Not of a rigid body.
 void set_surface_stiffness(BodyState& state);
 
@@ -130,6 +134,7 @@ inline void push_particle(BodyState& body, Index particle, float weight, const V
     const float share = weight * body.inverse_mass[particle];
     body.positions.add(particle, share * way);
     body.velocities.add(particle, share * velocity);
+    if (body.corners) body.corners->follow(particle, share * way, share * velocity);
     body.pushed_way = std::max(body.pushed_way, std::abs(share) * way.norm());
 }
 

@@ -25,44 +25,41 @@ public:
     void begin(std::span<const BodyState> bodies);
 
     /// Finds what might touch before anything has moved by the reaches, unless what was found last still holds: surface
-    /// points near obstacles and near cells of other bodies or far parts of their own, and pairs of balls of meshfree
-    /// bodies or of far parts of one.
+    /// points near obstacles and near cells of other bodies or far parts of their own.
     struct Search {
         double time;          ///< s
         float obstacle_reach; ///< m
-        float pair_reach;     ///< m, beside each other
         double frame;         ///< s: for about so long what is found is to hold
     };
     void search(std::span<BodyState> bodies, const Search& search, const RunContext& context);
     /// Before a frame of explicit steps.
-    void begin_frame(std::span<const BodyState> bodies, const RunContext& context) {
-        pairs_until_ = -1;
+    void begin_frame(std::span<BodyState> bodies, const RunContext& context) {
+        place_corners(bodies, context);
         matter_.begin_frame(bodies, context);
     }
     /// After a frame of explicit steps.
     void end_frame(std::span<const BodyState> bodies, const RunContext& context) { matter_.end_frame(bodies, context); }
     /// Positions have changed by dt times velocities. obstacle_way: m, bound on how far obstacles have gone.
-    void travel(std::span<const BodyState> bodies, float dt, float obstacle_way, const RunContext& context);
+    void travel(std::span<BodyState> bodies, float dt, float obstacle_way, const RunContext& context);
     /// m/s: bound on how fast particles go towards any obstacle, as of the last travel or begin_frame; but for light
     /// corners, which hardly move the surface.
     float approach_speed(std::span<const BodyState> bodies) const;
     /// A body's particles were moved by so much, m, beside their velocities.
     void was_moved(std::size_t body, float way) {
         near_way_ += way;
-        pairs_way_ += 2 * way;
         matter_.was_moved(body, way);
     }
     /// s: in longer steps something could pass through something.
     double longest_step() const { return matter_.longest_step(); }
     /// The same before anything is searched for, of all that is found anew: before a substep of descent.
     double longest_step_from(std::span<const BodyState> bodies, double left, const RunContext& context) {
-        near_until_ = pairs_until_ = -1;
+        near_until_ = -1;
         matter_.find_approaching(bodies, left, context);
         return matter_.longest_step();
     }
     /// The next search finds everything again, and ways are counted from here; anchors and touches stay.
     void begin_anew() {
-        near_until_ = pairs_until_ = -1;
+        near_until_ = -1;
         matter_.begin_anew();
     }
     /// The next search finds what is near obstacles: of what sleeps nothing was found.
@@ -88,16 +85,14 @@ public:
     template <class Visit>
     void each_holding(const Visit& visit) const {
         matter_.each_holding(visit);
-        for (const NearPair& pair : pairs_)
-            if (pair.grasp.holds && pair.first_body != pair.second_body) visit(pair.first_body, pair.second_body);
     }
 
     /// What bodies meet in a substep of descent, worked out once for all of them.
     struct Meetings {
         ObstaclePoses poses; ///< where the substep ends
         std::vector<MatterContacts::Frame> frames;
-        /// Of each body, ascending: twice the number of a frame, or of a pair of balls, and 1 for its second body.
-        IndexLists frames_of, pairs_of;
+        /// Of each body, ascending: twice the number of a frame, and 1 for its second body.
+        IndexLists frames_of;
     };
     /// Searches; search.time, dt: of the substep's end, and its length. Sleepers that something is about to touch wake.
     Meetings meetings(std::span<BodyState> bodies, const Search& search, float dt, const RunContext& context);
@@ -129,15 +124,8 @@ public:
             Vec3f anchor = Vec3f::Zero(); ///< world
             float friction = 0, unloading = 1;
             const MatterContacts::Frame* frame = nullptr; ///< or a point and the matter around it; `place` is its way
-            const BodyState* other = nullptr;             ///< or a ball, of another body or of far matter of the same
-            const Embedding* other_embedding = nullptr;
-            Index other_point = 0;
-            float reach = 0;              ///< sum of the balls' radii
-            bool rubs = false;            ///< not a push but friction, between the surface's points over two balls
-            Vec3f normal = Vec3f::Zero(); ///< of what rubs
-            Vec3f target = Vec3f::Zero(); ///< of what rubs: from the other's point; else of a pull: in the world
-            float limit = 0;              ///< N, most friction
-            Vec3f place = Vec3f::Zero(), other_place = Vec3f::Zero(); ///< of the points, by update_places
+            Vec3f target = Vec3f::Zero();                 ///< of a pull: in the world
+            Vec3f place = Vec3f::Zero();                  ///< of the point, by update_places
         };
         template <class Visit>
         void each_weight(const Entry& entry, const Visit& visit) const;
@@ -178,17 +166,10 @@ public:
         float clear_until;
         Vec3f anchor;
     };
-    /// Two balls that friction holds together.
-    struct BallMemory {
-        Index first_body, first, second_body, second;
-        std::uint32_t slides;
-        Vec3f offset;
-    };
     /// All that contacts remember.
     struct Memory {
         std::vector<NearMemory> near; ///< ascending by body, obstacle and point
         float near_way = 0, near_until = -1;
-        std::vector<BallMemory> balls; ///< ascending
         MatterContacts::Memory matter;
     };
     Memory memory() const;
@@ -213,51 +194,22 @@ private:
         std::size_t blocks() const { return (points.size() + kBlock - 1) / kBlock; }
         void pad() { clear_until.resize(blocks() * kBlock, 0); }
     };
-    /// Two balls near each other, of different bodies or of far parts of one.
-    struct NearPair {
-        Index first_body, first, second_body, second;
-        float clear_until; ///< pairs_way_ until which these cannot touch
-        PairContact law;
-        contact_law::Grasp grasp = {};
-        Vec3f offset = Vec3f::Zero(); ///< m, along both: how far the first has slid from where it landed
-
-        std::array<Index, 4> key() const { return {first_body, first, second_body, second}; }
-    };
-    /// On the first of a pair. Friction acts between the surface points over the balls, which lie by each other where
-    /// these touch, so that it hardly turns what it holds.
-    struct PairForce {
-        Vec3f push = Vec3f::Zero(), friction = Vec3f::Zero();
-    };
     Blocks::Entry block_of(const Near& at, const BodyState& body, const ObstaclePoses& poses, float dt) const;
-    void add_blocks_of(const NearPair& pair, std::span<const BodyState> bodies, bool of_first, float dt,
-                       std::vector<Blocks::Entry>& entries) const;
     ContactReport add_obstacle_forces(BodyState& body, std::size_t b, const ObstaclePoses& poses, float dt,
                                       std::vector<Vec3f>& forces, const RunContext& context);
     Vec3f obstacle_force(Near& at, float& clear_until, const BodyState& body, const ObstaclePoses& poses,
                          float dt) const;
-    PairForce pair_force(NearPair& pair, std::span<const BodyState> bodies, float dt) const;
-    /// From the second's point to the first's, balls or surface points over them; of positions, or of velocities.
-    static Vec3f between(const NearPair& pair, std::span<const BodyState> bodies, Embedding BodyState::*points,
-                         const Vectors& of_first, const Vectors& of_second);
-    std::vector<NearPair> held_pairs() const; ///< those that friction holds, ascending
     void push_particles_out(BodyState& body, std::size_t obstacle, const Vec3f& outwards, const ObstaclePoses& poses,
                             const RunContext& context);
     void find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context);
-    void find_pairs(std::span<const BodyState> bodies, float reach, const RunContext& context);
-    void find_own_pairs(const BodyState& body, Index number, const Vectors& balls, float reach);
 
     const World& world_;
-    bool between_bodies_, within_bodies_;
     std::vector<Vec3f> towards_;      ///< of each obstacle, the way to it: of half-spaces that stand still; else 0
     std::vector<NearPoints> near_;    ///< by body
     std::vector<float> deepest_near_; ///< m, of each body, now
     std::map<const Body*, std::vector<float>> most_depths_; ///< of bodies that were crushed: m, of each particle
-    std::vector<NearPair> pairs_;
-    struct OwnBalls;                                         ///< of a body whose balls meet each other
-    std::vector<std::shared_ptr<const OwnBalls>> own_balls_; ///< null: of the others
-    float near_way_ = 0;                       ///< m that anything may have come nearer to obstacles since ...
-    float pairs_way_ = 0;                      ///< ... and balls beside each other ...
-    float near_until_ = -1, pairs_until_ = -1; ///< ... and may go before they hold no more
+    float near_way_ = 0;    ///< m that anything may have come nearer to obstacles since ...
+    float near_until_ = -1; ///< ... and may go before they hold no more
     static constexpr std::uint8_t kOnObstacle = 1, kInMatter = MatterContacts::kTouched,
                                   kInItself = MatterContacts::kTouchedItself;
     std::vector<std::uint8_t> touched_; ///< of each body

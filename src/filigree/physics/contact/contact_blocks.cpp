@@ -48,8 +48,6 @@ void Contacts::Blocks::update_places(std::span<const BodyState> bodies, const Ve
             continue;
         }
         entry.place = embedded_point(*entry.embedding, entry.point, positions);
-        if (entry.other)
-            entry.other_place = embedded_point(*entry.other_embedding, entry.other_point, entry.other->positions);
     }
 }
 
@@ -72,19 +70,6 @@ void Contacts::Blocks::add(Index particle, const Vectors& positions, Vec3f& forc
             force -= weight * grip * offset;
             block.add_scaled_identity(squared * grip);
             block.add_outer(frame.normal, -squared * grip);
-        } else if (entry.rubs) {
-            const Vec3f offset = along_surface(place - entry.other_place - entry.target, entry.normal);
-            const float grip = sliding_grip(stiffness, offset.norm(), entry.limit);
-            force -= weight * grip * offset;
-            block.add_scaled_identity(squared * grip);
-            block.add_outer(entry.normal, -squared * grip);
-        } else if (entry.other) {
-            const Vec3f between = place - entry.other_place;
-            const float distance = between.norm();
-            if (!(distance < entry.reach && distance > 0)) continue;
-            const Vec3f normal = between / distance;
-            force += weight * stiffness * entry.unloading * (entry.reach - distance) * normal;
-            block.add_outer(normal, squared * stiffness);
         } else if (entry.obstacle) {
             const DistanceField::Sample surface = distance_to(*entry.obstacle, *entry.motion, place);
             if (!(surface.distance < 0)) continue;
@@ -105,8 +90,8 @@ void Contacts::Blocks::add(Index particle, const Vectors& positions, Vec3f& forc
 }
 
 bool Contacts::Blocks::holds() const {
-    return std::ranges::any_of(
-        entries_, [](const Entry& entry) { return entry.frame ? entry.frame->holds : entry.anchored || entry.rubs; });
+    return std::ranges::any_of(entries_,
+                               [](const Entry& entry) { return entry.frame ? entry.frame->holds : entry.anchored; });
 }
 
 void Contacts::Blocks::add_pull(const Embedding& points, std::size_t point, const Vec3f& target, float stiffness) {
@@ -156,40 +141,9 @@ Contacts::Blocks::Entry Contacts::block_of(const Near& at, const BodyState& body
     return entry;
 }
 
-/// A pair as one of its two sees it: its push, and where friction holds it, by how deep it is as the substep begins,
-/// also that.
-void Contacts::add_blocks_of(const NearPair& pair, std::span<const BodyState> bodies, bool of_first, float dt,
-                             std::vector<Blocks::Entry>& entries) const {
-    const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];
-    const Vec3f apart = between(pair, bodies, &BodyState::balls, a.positions, b.positions);
-    const Vec3f normal = apart.stableNormalized();
-    const float closing = between(pair, bodies, &BodyState::balls, a.velocities, b.velocities).dot(normal);
-    const BodyState &body = of_first ? a : b, &other = of_first ? b : a;
-    Blocks::Entry push;
-    push.embedding = &body.balls;
-    push.point = of_first ? pair.first : pair.second;
-    push.stiffness = pair_stiffness(a, pair.first, b, pair.second);
-    push.other = &other;
-    push.other_embedding = &other.balls;
-    push.other_point = of_first ? pair.second : pair.first;
-    push.reach = a.ball_radius + b.ball_radius;
-    push.unloading = unloading(pair.law.restitution, closing, smooth_speed(world_, dt));
-    entries.push_back(push);
-    const float depth = push.reach - apart.norm();
-    if (!pair.grasp.holds || !(depth > 0)) return;
-    Blocks::Entry friction = push;
-    friction.embedding = &body.surface;
-    friction.other_embedding = &other.surface;
-    friction.rubs = true;
-    friction.normal = normal;
-    friction.target = between(pair, bodies, &BodyState::surface, a.positions, b.positions) - pair.offset;
-    if (!of_first) friction.target = -friction.target;
-    friction.limit = float(pair.law.friction) * push.unloading * push.stiffness * depth;
-    entries.push_back(friction);
-}
-
 Contacts::Meetings Contacts::meetings(std::span<BodyState> bodies, const Search& search, float dt,
                                       const RunContext& context) {
+    place_corners(bodies, context);
     this->search(bodies, search, context);
     std::vector<MatterContacts::Frame> frames = matter_.frames(bodies, dt);
     if (matter_.wake_met(bodies, frames)) {
@@ -197,11 +151,9 @@ Contacts::Meetings Contacts::meetings(std::span<BodyState> bodies, const Search&
         this->search(bodies, search, context);
         frames = matter_.frames(bodies, dt);
     }
-    std::vector<Index> of_frames, of_pairs; // two bodies of each
+    std::vector<Index> of_frames; // two bodies of each
     for (const MatterContacts::Frame& frame : frames) of_frames.insert(of_frames.end(), {frame.body, frame.other});
-    for (const NearPair& pair : pairs_) of_pairs.insert(of_pairs.end(), {pair.first_body, pair.second_body});
-    return {ObstaclePoses(world_, search.time), std::move(frames), corners_at_vertices(of_frames, bodies.size()),
-            corners_at_vertices(of_pairs, bodies.size())};
+    return {ObstaclePoses(world_, search.time), std::move(frames), corners_at_vertices(of_frames, bodies.size())};
 }
 
 Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t b, const Meetings& met, float dt,
@@ -214,7 +166,6 @@ Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t
         blocks.entries_.push_back(block_of(at, body, met.poses, dt));
         blocks.entries_.back().motion = &met.poses.at(at.obstacle);
     }
-    for (const Index end : met.pairs_of[b]) add_blocks_of(pairs_[end / 2], bodies, end % 2 == 0, dt, blocks.entries_);
     const MatterContacts::Frame* before = nullptr;
     for (const Index end : met.frames_of[b]) {
         const MatterContacts::Frame& frame = met.frames[end / 2];
@@ -230,7 +181,7 @@ Contacts::Blocks Contacts::blocks(std::span<const BodyState> bodies, std::size_t
     return blocks;
 }
 
-ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, std::span<const Vectors> start, double time) {
+ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, std::span<const Vectors>, double time) {
     ContactReport report;
     const ObstaclePoses poses(world_, time);
     std::ranges::fill(touched_, std::uint8_t{0});
@@ -260,26 +211,6 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, std::s
         }
         report.deepest = std::max(report.deepest, deepest_near_[b]);
     }
-    for (NearPair& pair : pairs_) {
-        const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];
-        const Vec3f apart = between(pair, bodies, &BodyState::balls, a.positions, b.positions);
-        const float depth = a.ball_radius + b.ball_radius - apart.norm();
-        if (!(depth > 0)) {
-            pair.grasp = {};
-            continue;
-        }
-        touched_[pair.first_body] |= kInMatter;
-        touched_[pair.second_body] |= kInMatter;
-        ++report.contacts;
-        if (pair.grasp.holds)
-            pair.offset += between(pair, bodies, &BodyState::surface, a.positions, b.positions) -
-                           between(pair, bodies, &BodyState::surface, start[pair.first_body], start[pair.second_body]);
-        else
-            pair.offset.setZero();
-        pair.grasp = {true, false};
-        pair.offset = limited(along_surface(pair.offset, apart.stableNormalized()),
-                              float(pair.law.friction) * depth / kTangentialStiffness);
-    }
     const ContactReport inside = matter_.update_anchors(bodies, touched_);
     report.contacts += inside.contacts;
     report.deepest_in_matter = inside.deepest_in_matter;
@@ -288,8 +219,6 @@ ContactReport Contacts::update_anchors(std::span<const BodyState> bodies, std::s
 
 void Contacts::join_touching(DisjointSets& groups, std::span<std::uint8_t> is_held) const {
     matter_.each_touching([&](Index a, Index b) { groups.join(a, b); });
-    for (const NearPair& pair : pairs_)
-        if (touched_[pair.first_body] && touched_[pair.second_body]) groups.join(pair.first_body, pair.second_body);
     for (std::size_t b = 0; b < touched_.size(); ++b)
         if (touched_[b] & kOnObstacle) is_held[b] = 1;
 }

@@ -18,6 +18,35 @@ constexpr float kSlowest = 0.2f, kSlowestBeside = 0.02f;
 constexpr float kLittle = 0.05f;      ///< spacings until a point that is nowhere is asked again ...
 constexpr float kLittleBeside = 0.2f; ///< ... and the same of those, by their own speed
 
+struct Carrier {
+    Index particle;
+    float weight;
+};
+
+/// The particles that move a place in matter, each once.
+std::vector<Carrier> carriers_of(const BodyState& body, const Matter& matter, const Matter::Place& place) {
+    const Matter::Weights weights = matter.weights(place);
+    const auto& corners = matter.corners(place.cell);
+    std::vector<Carrier> carriers;
+    if (!body.corners) {
+        for (int c = 0; c < 8; ++c) carriers.push_back({corners[c], weights[c]});
+        return carriers;
+    }
+    const Embedding& carried = body.body->corners;
+    for (int c = 0; c < 8; ++c)
+        for (Index k = carried.offsets[corners[c]]; k < carried.offsets[corners[c] + 1]; ++k)
+            carriers.push_back({carried.particles[k], weights[c] * carried.weights[k]});
+    std::ranges::stable_sort(carriers, {}, &Carrier::particle);
+    std::size_t kept = 0;
+    for (std::size_t k = 1; k < carriers.size(); ++k)
+        if (carriers[k].particle == carriers[kept].particle)
+            carriers[kept].weight += carriers[k].weight;
+        else
+            carriers[++kept] = carriers[k];
+    carriers.resize(std::min(kept + 1, carriers.size()));
+    return carriers;
+}
+
 } // namespace
 
 void MatterContacts::leave(Pair& pair, const Side& side, float clearance) const {
@@ -36,7 +65,7 @@ float MatterContacts::clearance(const Pair& pair, const Side& side, float distan
     if (safe == 0) return 0;
     const BodyState &body = bodies[side.body], &other = bodies[side.other];
     const Vec3f velocity = embedded_point(body.surface, pair.point, body.velocities) -
-                           matter_[side.other]->mean(pair.place, other.velocities);
+                           matter_[side.other]->mean(pair.place, other.corner_velocities());
     return safe * side.speed / (velocity.norm() + slowest * side.speed);
 }
 
@@ -82,12 +111,12 @@ std::optional<Vec3f> MatterContacts::enter(Pair& pair, const Side& side, std::sp
     const float slowest = beside ? kSlowestBeside : kSlowest;
     std::optional<Matter::Depth> found;
     if (Mat3f inverse; !(beside && pair.entry.isZero(0)) && // its walk would end at its own place
-                       matter.locate(other.positions, point, pair.place, inverse) &&
+                       matter.locate(other.corner_positions(), point, pair.place, inverse) &&
                        !(own && !is_elsewhere(pair, pair.place, matter)))
         found = matter.depth(pair.place, inverse, pair.entry);
     if (own && !found) {
         pair.place.cell = from;
-        found = find_fold(pair, point, matter, body.positions, pair.place);
+        found = find_fold(pair, point, matter, body.corner_positions(), pair.place);
     }
     if (!found) {
         pair.place.local.setConstant(0.5f);
@@ -127,15 +156,16 @@ Vec3f MatterContacts::force(Pair& pair, const Side& side, std::span<const BodySt
     const Matter& matter = *matter_[side.other];
     const Touch touch{*normal,
                       embedded_point(body.surface, pair.point, body.velocities) -
-                          matter.mean(pair.place, other.velocities),
+                          matter.mean(pair.place, other.corner_velocities()),
                       pair.depth,
                       stiffness(side, pair, bodies),
                       float(side.law.friction),
                       float(side.law.restitution),
                       std::max(body.rest_squared_frequency, other.rest_squared_frequency)};
-    const Vec3f place = matter.mean(pair.place, other.positions);
+    const Vec3f place = matter.mean(pair.place, other.corner_positions());
     Vec3f offset = Vec3f::Zero();
-    if (pair.grasp.holds) offset = along_surface(place - matter.mean(pair.anchor, other.positions), touch.normal);
+    if (pair.grasp.holds)
+        offset = along_surface(place - matter.mean(pair.anchor, other.corner_positions()), touch.normal);
     const bool landed = !pair.grasp.holds;
     const Vec3f force = touch_force(touch, offset, pair.grasp, dt, smooth_speed(world_, dt));
     if (landed || pair.grasp.slides) anchor_at(pair, side, other, offset);
@@ -146,7 +176,7 @@ Vec3f MatterContacts::force(Pair& pair, const Side& side, std::span<const BodySt
 void MatterContacts::anchor_at(Pair& pair, const Side& side, const BodyState& other, const Vec3f& offset) const {
     pair.anchor = pair.place;
     if (!offset.isZero(0))
-        pair.anchor.local -= matter_[side.other]->inverse_derivative(other.positions, pair.place) * offset;
+        pair.anchor.local -= matter_[side.other]->inverse_derivative(other.corner_positions(), pair.place) * offset;
 }
 
 ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
@@ -168,13 +198,16 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         const Side& side = sides_[work_[k].first];
         const Pair& pair = side.pairs[work_[k].second];
         add_to_particles(bodies[side.body].surface, pair.point, force, bodies[side.body].forces);
-        matter_[side.other]->add(pair.place, -force, bodies[side.other].forces);
+        matter_[side.other]->add(pair.place, -force, bodies[side.other].corner_forces());
         touched[side.body] |= touch_of(side);
         touched[side.other] |= touch_of(side);
         ++report.contacts;
         report.deepest_in_matter = std::max(report.deepest_in_matter, depth);
         is_too_deep_ |= depth > most_depth(side);
     }
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+        if (bodies[b].corners && touched[b] & (kTouched | kTouchedItself))
+            bodies[b].corners->give_forces(bodies[b].forces, context);
     return report;
 }
 
@@ -194,30 +227,30 @@ void MatterContacts::push_out(Pair& pair, const Side& side, std::span<BodyState>
     if (!normal || !(too_deep > 0)) return;
     BodyState &body = bodies[side.body], &other = bodies[side.other];
     const Matter& matter = *matter_[side.other];
-    const Matter::Weights weights = matter.weights(pair.place);
-    const auto& corners = matter.corners(pair.place.cell);
+    const std::vector<Carrier> carriers = carriers_of(other, matter, pair.place);
     float gives = yielding(body.surface, pair.point, body.inverse_mass);
-    for (int c = 0; c < 8; ++c) gives += weights[c] * weights[c] * other.inverse_mass[corners[c]];
+    for (const auto& [particle, weight] : carriers) gives += weight * weight * other.inverse_mass[particle];
     if (!(gives > 0)) return;
     const Vec3f velocity =
-        embedded_point(body.surface, pair.point, body.velocities) - matter.mean(pair.place, other.velocities);
+        embedded_point(body.surface, pair.point, body.velocities) - matter.mean(pair.place, other.corner_velocities());
     const Vec3f way = too_deep / gives * *normal;
     const Vec3f push = std::max(0.0f, -velocity.dot(*normal)) / gives * *normal;
     for (Index k = body.surface.offsets[pair.point]; k < body.surface.offsets[pair.point + 1]; ++k)
         push_particle(body, body.surface.particles[k], body.surface.weights[k], way, push);
-    for (int c = 0; c < 8; ++c) push_particle(other, corners[c], -weights[c], way, push);
+    for (const auto& [particle, weight] : carriers) push_particle(other, particle, -weight, way, push);
 }
 
 std::vector<MatterContacts::Frame> MatterContacts::frames(std::span<const BodyState> bodies, float dt) const {
     std::vector<Frame> frames;
     for (const Side& side : sides_)
         for (Pair pair : side.pairs) {
+            if (bodies[side.other].corners) break; // blocks are of particles
             const BodyState &body = bodies[side.body], &other = bodies[side.other];
             const Matter& matter = *matter_[side.other];
             std::optional<Vec3f> normal = enter(pair, side, bodies);
             float depth = pair.depth;
-            const Vec3f velocity =
-                embedded_point(body.surface, pair.point, body.velocities) - matter.mean(pair.place, other.velocities);
+            const Vec3f velocity = embedded_point(body.surface, pair.point, body.velocities) -
+                                   matter.mean(pair.place, other.corner_velocities());
             if (!normal) { // what is outside may touch before the substep ends
                 if (pair.tangled || pair.clear_until > side.way + kMostReach * side.spacing) continue;
                 if (side.body == side.other && matter.are_together(matter.cell_of_point(pair.point), pair.place.cell))
@@ -225,7 +258,7 @@ std::vector<MatterContacts::Frame> MatterContacts::frames(std::span<const BodySt
             }
             // The surface that is nearest when the substep ends: a point that comes in just behind an edge would run
             // against the face that it is about to pass.
-            const Mat3f inverse = matter.inverse_derivative(other.positions, pair.place);
+            const Mat3f inverse = matter.inverse_derivative(other.corner_positions(), pair.place);
             const Vec3f way = dt * velocity;
             Matter::Place then = pair.place;
             then.local += inverse * way;
@@ -242,16 +275,17 @@ std::vector<MatterContacts::Frame> MatterContacts::frames(std::span<const BodySt
             frame.point = pair.point;
             frame.place = pair.place;
             frame.normal = *normal;
-            frame.start =
-                matter.mean(pair.place, other.positions) - embedded_point(body.surface, pair.point, body.positions);
+            frame.start = matter.mean(pair.place, other.corner_positions()) -
+                          embedded_point(body.surface, pair.point, body.positions);
             frame.depth = depth;
             frame.stiffness = stiffness(side, pair, bodies);
             frame.unloading = unloading(side.law.restitution, velocity.dot(*normal), smooth_speed(world_, dt));
             frame.friction = float(side.law.friction);
             frame.holds = pair.grasp.holds;
             if (frame.holds)
-                frame.offset = along_surface(
-                    matter.mean(pair.place, other.positions) - matter.mean(pair.anchor, other.positions), frame.normal);
+                frame.offset = along_surface(matter.mean(pair.place, other.corner_positions()) -
+                                                 matter.mean(pair.anchor, other.corner_positions()),
+                                             frame.normal);
         }
     return frames;
 }
@@ -273,8 +307,9 @@ ContactReport MatterContacts::update_anchors(std::span<const BodyState> bodies, 
             const bool landed = !pair.grasp.holds;
             Vec3f offset = Vec3f::Zero();
             if (!landed)
-                offset = along_surface(
-                    matter.mean(pair.place, other.positions) - matter.mean(pair.anchor, other.positions), *normal);
+                offset = along_surface(matter.mean(pair.place, other.corner_positions()) -
+                                           matter.mean(pair.anchor, other.corner_positions()),
+                                       *normal);
             const float limit = float(side.law.friction) * pair.depth;
             const float stretch = kTangentialStiffness * offset.norm();
             pair.grasp = {true, stretch > limit};

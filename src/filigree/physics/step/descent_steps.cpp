@@ -71,7 +71,6 @@ private:
         met_.emplace(state_.contacts.meetings(bodies_,
                                               {.time = now_,
                                                .obstacle_reach = std::clamp(way, 0.25f * spacing, 8 * spacing),
-                                               .pair_reach = std::clamp(2 * way, 0.5f * spacing, 1.5f * spacing),
                                                .frame = double(dt_)},
                                               dt_, context_));
         for (std::size_t b = 0; b < bodies_.size(); ++b) {

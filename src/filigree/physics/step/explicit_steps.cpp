@@ -200,12 +200,10 @@ private:
         const float speed = state_.contacts.approach_speed(bodies_) + float(state_.world.gravity.norm() * frame);
         const float way = speed * float(frame) + float(obstacle_way(state_.world, bodies_, now_, now_ + frame));
         const float spacing = least_spacing(bodies_);
-        state_.contacts.search(bodies_,
-                               {.time = now_,
-                                .obstacle_reach = std::clamp(2 * way, 0.25f * spacing, 4 * spacing),
-                                .pair_reach = 0.5f * spacing,
-                                .frame = frame},
-                               context_);
+        state_.contacts.search(
+            bodies_,
+            {.time = now_, .obstacle_reach = std::clamp(2 * way, 0.25f * spacing, 4 * spacing), .frame = frame},
+            context_);
     }
 
     /// All forces at the present positions, and the step that is stable there.

@@ -12,7 +12,6 @@ namespace {
 // The name of the format, its version last. A: meshfree bodies touch as others do.
 constexpr std::uint64_t kMagic = 0x41455441'54534c46; // "FLSTATEA"
 static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
-static_assert(sizeof(Contacts::BallMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(MatterContacts::SideMemory) == 6 * sizeof(Index), "padding would be saved");
 static_assert(sizeof(MatterContacts::PairMemory) == 4 * sizeof(Index) + 3 * sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(LinkState) == 2 * sizeof(float) + sizeof(Vec3f), "padding would be saved");
@@ -63,7 +62,6 @@ void write_contacts(ByteWriter& writer, const Contacts::Memory& contacts) {
     writer.array(std::span(contacts.near));
     writer.value(contacts.near_way);
     writer.value(contacts.near_until);
-    writer.array(std::span(contacts.balls));
     writer.value(contacts.matter.way);
     writer.value(contacts.matter.until);
     writer.array(std::span(contacts.matter.sides));
@@ -76,7 +74,6 @@ Contacts::Memory read_contacts(ByteReader& reader) {
     contacts.near = reader.array<Contacts::NearMemory>();
     contacts.near_way = reader.value<float>();
     contacts.near_until = reader.value<float>();
-    contacts.balls = reader.array<Contacts::BallMemory>();
     contacts.matter.way = reader.value<float>();
     contacts.matter.until = reader.value<float>();
     contacts.matter.sides = reader.array<MatterContacts::SideMemory>();
