@@ -21,7 +21,7 @@ BodyState resting(std::size_t nx, std::size_t ny, std::size_t nz, double spacing
     state.rest_squared_frequency =
         state.elasticity->forces(state.body->rest, state.forces, kOneThread).squared_frequency;
     for (const float mass : state.body->mass) state.inverse_mass.push_back(1 / mass);
-    embed_surface_at_rest(state, false, kOneThread);
+    state.surface = state.body->surface.points;
     return state;
 }
 

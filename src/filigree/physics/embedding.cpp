@@ -162,9 +162,14 @@ private:
     const Cells& cells_;
 };
 
+struct WeightLimits {
+    double floor = -std::numeric_limits<double>::infinity(); ///< linear only as far as no weight falls below
+    double lowest = kLeastWeight; ///< weight with which a point that none can carry well is still carried linearly
+};
+
 /// What the weights of one point are made of.
 struct Fit {
-    double floor = -std::numeric_limits<double>::infinity(); ///< linear only as far as no weight falls below
+    WeightLimits limits;
     std::vector<ParticleGrid::Near> near;
     std::vector<double> weights;
     double least = 0; ///< weight
@@ -215,7 +220,7 @@ private:
         double part = 1;
         for (std::size_t n = 0; n < near.size(); ++n) {
             const double plain = weights[n] / sum, change = weights[n] * slope.dot(near[n].position - middle);
-            if (plain + change < floor) part = std::min(part, (plain - floor) / -change);
+            if (plain + change < limits.floor) part = std::min(part, (plain - limits.floor) / -change);
         }
         return part;
     }
@@ -276,11 +281,11 @@ void embed_point(const Vec3d& point, const ParticleGrid& grid, const Reached& re
     }
     // Not to be had: what can be had from those around the nearest particle, and no slope where that shoots too far.
     piece.report.far_points += !far;
-    growth = 1;
+    growth = fit.limits.lowest < kLeastWeight ? std::pow(kRadiusGrowth, kAttempts - 1) : 1;
     const double radius = reach();
     find(radius);
     fit.solve(point, radius, true);
-    if (fit.least < kLeastWeight) {
+    if (fit.least < fit.limits.lowest) {
         double sum = 0;
         for (std::size_t n = 0; n < fit.near.size(); ++n) {
             const double s = 1 - fit.near[n].squared_distance / (radius * radius);
@@ -294,7 +299,7 @@ void embed_point(const Vec3d& point, const ParticleGrid& grid, const Reached& re
 
 template <class Reached>
 Embedding embed_points(std::span<const Vec3f> points, const Vectors& rest, double spacing, const Reached& reached,
-                       double floor, const RunContext& context, EmbeddingReport* report) {
+                       const WeightLimits& limits, const RunContext& context, EmbeddingReport* report) {
     Embedding embedding;
     embedding.rest.assign(points.begin(), points.end());
     embedding.offsets.assign(points.size() + 1, 0);
@@ -306,7 +311,7 @@ Embedding embed_points(std::span<const Vec3f> points, const Vectors& rest, doubl
     parallel_for(context, points.size(), kEmbeddingGrain, [&](std::size_t begin, std::size_t end) {
         Piece& piece = pieces[begin / kEmbeddingGrain];
         Fit fit;
-        fit.floor = floor;
+        fit.limits = limits;
         for (std::size_t p = begin; p < end; ++p)
             embed_point(points[p].cast<double>(), grid, reached, spacing, fit, piece);
     });
@@ -336,23 +341,23 @@ Embedding embed_points(std::span<const Vec3f> points, const Vectors& rest, doubl
 
 Embedding embed(std::span<const Vec3f> points, const Vectors& rest, double spacing, const RunContext& context,
                 EmbeddingReport* report) {
-    return embed_points(points, rest, spacing, ReachedCorners(nullptr), -std::numeric_limits<double>::infinity(),
-                        context, report);
+    return embed_points(points, rest, spacing, ReachedCorners(nullptr), {}, context, report);
 }
 
 Embedding embed_to_follow(std::span<const Vec3f> points, const Vectors& rest, double spacing, const Cells* cells,
                           const RunContext& context) {
-    return embed_points(points, rest, spacing, ReachedCorners(cells), kFollowingWeight, context, nullptr);
+    return embed_points(points, rest, spacing, ReachedCorners(cells), {.floor = kFollowingWeight}, context, nullptr);
 }
 
 Embedding embed_corners(const Cells& cells, const Vectors& rest, const RunContext& context) {
-    constexpr double kNearer = 0.7; // radius: 1.2 spacings hold the particles of the cells around
+    constexpr double kNearer = 0.7;         // radius: 1.2 spacings hold the particles of the cells around
+    constexpr double kLowestOfCorners = -4; // corners that do not follow would deform their cells
     std::vector<Vec3f> corners;
     corners.reserve(cells.corners.size());
     for (const auto& index : cells.corners)
         corners.push_back((cells.origin + cells.spacing * Vec3d(index[0], index[1], index[2])).cast<float>());
-    return embed_points(corners, rest, kNearer * cells.spacing, ReachedCells(cells),
-                        -std::numeric_limits<double>::infinity(), context, nullptr);
+    return embed_points(corners, rest, kNearer * cells.spacing, ReachedCells(cells), {.lowest = kLowestOfCorners},
+                        context, nullptr);
 }
 
 namespace {

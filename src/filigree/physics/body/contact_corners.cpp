@@ -26,6 +26,7 @@ ContactCorners::ContactCorners(const Embedding& carried, std::size_t particles)
         }
 }
 
+/// Numbers as long as the particles are some, also where sums are not.
 void ContactCorners::place(const Vectors& positions, const Vectors& velocities, const RunContext& context) {
     parallel_for(context, carried_->size(), kContactCornersGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t corner = begin; corner < end; ++corner) {
@@ -34,8 +35,9 @@ void ContactCorners::place(const Vectors& positions, const Vectors& velocities, 
                 place += carried_->weights[k] * positions[carried_->particles[k]];
                 velocity += carried_->weights[k] * velocities[carried_->particles[k]];
             }
-            positions_.set(corner, place);
-            velocities_.set(corner, velocity);
+            const Index first = carried_->particles[carried_->offsets[corner]];
+            positions_.set(corner, place.allFinite() ? place : positions[first]);
+            velocities_.set(corner, velocity.allFinite() ? velocity : velocities[first]);
         }
     });
 }

@@ -55,8 +55,8 @@ void yield(PlasticCell& cell, const CellSums& sums, float size, const FlowLaw& l
     after.inverse /= std::cbrt(after.inverse.determinant());
     const Mat3f back = linear_part(sums).inverse();
     for (int b = 0; b < 4; ++b) after.bent[b] += (1 - kept) * (back * elastic[kBentSums[b]]);
-    const float flowed = after.inverse.squaredNorm();
-    if (!after.is_sound() || (flowed > kMostFlowed && flowed > cell.inverse.squaredNorm())) return;
+    if (!after.is_sound()) return;
+    if (flowed(after.inverse) > kMostFlowed && flowed(after.inverse) > flowed(cell.inverse)) return;
     cell = after;
 }
 

@@ -20,8 +20,7 @@ void yield_particle(Mat3f& inverse, const Mat3f& gradient, const FlowLaw& law) {
     if (!filigree::flow(elastic, law, R)) return;
     Mat3f after = inverse * R;
     after /= std::cbrt(after.determinant());
-    const float flowed = after.squaredNorm();
-    if (!after.allFinite() || (flowed > kMostFlowed && flowed > inverse.squaredNorm())) return;
+    if (!after.allFinite() || (flowed(after) > kMostFlowed && flowed(after) > flowed(inverse))) return;
     inverse = after;
 }
 
