@@ -68,11 +68,10 @@ private:
         const float speed = most_particle_speed(bodies_) + float(state_.world.gravity.norm()) * dt_;
         const float obstacles = float(obstacle_way(state_.world, bodies_, now_ - double(dt_), now_));
         const float way = 1.5f * speed * dt_ + 1.5f * obstacles, spacing = least_spacing(bodies_);
-        met_.emplace(state_.contacts.meetings(bodies_,
-                                              {.time = now_,
-                                               .obstacle_reach = std::clamp(way, 0.25f * spacing, 8 * spacing),
-                                               .frame = double(dt_)},
-                                              dt_, context_));
+        met_.emplace(state_.contacts.meetings(
+            bodies_,
+            {.time = now_, .obstacle_reach = std::clamp(way, 0.25f * spacing, 8 * spacing), .frame = double(dt_)}, dt_,
+            context_));
         for (std::size_t b = 0; b < bodies_.size(); ++b) {
             if (bodies_[b].sleeps()) {
                 blocks_.emplace_back(); // of what is not swept
