@@ -57,7 +57,7 @@ void fall(benchmark::State& state) {
     const RunContext context(unsigned(state.range(1)));
     Simulation simulation = thrown(Index(state.range(0)), context);
     const std::string start = simulation.save();
-    double contact = 0, elastic = 0, substeps = 0, descents = 0;
+    double contact = 0, elastic = 0, substeps = 0;
     for (auto _ : state) {
         state.PauseTiming();
         (void)simulation.restore(start);
@@ -67,7 +67,6 @@ void fall(benchmark::State& state) {
             contact += report.contact_seconds;
             elastic += report.elastic_seconds;
             substeps += report.substeps;
-            descents += report.why_descent != DescentCause::none;
         }
     }
     const double frames = double(state.iterations()) * kFrames;
@@ -75,7 +74,6 @@ void fall(benchmark::State& state) {
     state.counters["elastic_ms"] = 1e3 * elastic / frames;
     state.counters["contact_ms"] = 1e3 * contact / frames;
     state.counters["substeps"] = substeps / frames;
-    state.counters["by_descent"] = descents / frames;
     state.counters["particles"] = double(simulation.body(0).particle_count());
     const FractureReport broken = simulation.fracture(0);
     state.counters["parts"] = double(broken.parts);

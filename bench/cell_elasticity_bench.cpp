@@ -1,4 +1,4 @@
-// The fem material: cells a second for forces and for descent sweeps, against a plain loop of the same formulas.
+// The fem material: cells a second for forces, against a plain loop of the same formulas.
 // One thread counts processor time, two count the clock's; items are cells.
 #include "interactive/cell_forces.h"
 
@@ -35,16 +35,6 @@ void forces(benchmark::State& state, int lanes, unsigned threads) {
     count_cells(state, s);
 }
 
-void sweep(benchmark::State& state, int lanes, unsigned threads) {
-    const ShakenBox& s = box(state.range(0));
-    const cell_kernel::Plan plan = cell_kernel::make_plan(s.body);
-    const RunContext context(threads);
-    Vectors positions = s.positions;
-    const Descent descent{s.positions, s.inertia, s.fixed, s.touched};
-    for (auto _ : state) cell_kernel::sweep(plan, positions, descent, lanes, context);
-    count_cells(state, s);
-}
-
 void plain(benchmark::State& state) {
     const ShakenBox& s = box(state.range(0));
     Vectors result(s.positions.size());
@@ -71,24 +61,16 @@ const bool kRegistered = [] {
     for (const int lanes : cell_kernel::lane_counts()) {
         const std::string suffix = "/lanes:" + std::to_string(lanes);
         auto* f = benchmark::RegisterBenchmark(("forces" + suffix).c_str(), forces, lanes, 1u);
-        auto* d = benchmark::RegisterBenchmark(("sweep" + suffix).c_str(), sweep, lanes, 1u);
-        for (auto* b : {f, d}) {
-            b->Unit(benchmark::kMicrosecond);
-            if (lanes == cell_kernel::lane_counts().back())
-                b->Arg(1000)->Arg(8000)->Arg(10000)->Arg(27000)->Arg(64000)->Arg(200000);
-            else
-                b->Arg(8000)->Arg(200000);
-        }
+        f->Unit(benchmark::kMicrosecond);
+        if (lanes == cell_kernel::lane_counts().back())
+            f->Arg(1000)->Arg(8000)->Arg(10000)->Arg(27000)->Arg(64000)->Arg(200000);
+        else
+            f->Arg(8000)->Arg(200000);
     }
     const int lanes = cell_kernel::lane_counts().back();
     for (const unsigned threads : {1u, 2u}) {
         const std::string suffix = "/threads:" + std::to_string(threads);
         benchmark::RegisterBenchmark(("forces" + suffix).c_str(), forces, lanes, threads)
-            ->Unit(benchmark::kMicrosecond)
-            ->Arg(8000)
-            ->Arg(200000)
-            ->UseRealTime();
-        benchmark::RegisterBenchmark(("sweep" + suffix).c_str(), sweep, lanes, threads)
             ->Unit(benchmark::kMicrosecond)
             ->Arg(8000)
             ->Arg(200000)

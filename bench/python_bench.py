@@ -43,7 +43,7 @@ def tasks_of(mesh, threads):
     tiny_positions, tiny_gradients = numpy.array(tiny_pose.positions), numpy.array(tiny_pose.gradients)
 
     body = filigree.Body(mesh, filigree.Material("wood", young_modulus=1e5, density=1000, damping=0.5), threads=threads)
-    simulation = filigree.Simulation([body], mode="descent", threads=threads)
+    simulation = filigree.Simulation([body], mode="explicit", threads=threads)
     return len(tiny), {
         "restore": lambda: seconds_of(
             RESTORES, lambda: restorer.positions(positions, gradients, out=out, threads=threads)

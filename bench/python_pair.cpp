@@ -64,7 +64,7 @@ int main(int count, char** words) {
     Simulation simulation =
         Simulation::create(
             {}, {{.body = std::make_shared<const Body>(make_body(mesh, material, options, context).value())}},
-            {.mode = StepMode::descent}, context)
+            {.mode = StepMode::explicit_steps}, context)
             .value();
 
     const std::map<std::string, std::function<double()>> tasks = {

@@ -125,12 +125,11 @@ void run(FractureArguments options, Session& session) {
     const double seconds = now_seconds() - start;
     if (const std::string turned = outward_sentence(fractured.report.outward); !turned.empty())
         session.warn(options.input + ": " + turned);
-    if (!mesh.objects.empty() || !mesh.groups.empty())
-        session.warn(options.input + ": its objects and groups are replaced by the pieces.");
     if (options.explode > 0) explode(fractured, options.explode);
 
     Report report;
     report.set("output", options.output);
+    if (!mesh.objects.empty() || !mesh.groups.empty()) report.row("objects, groups", "replaced by the pieces");
     if (is_folder(options.output)) {
         write_folder(fractured, mesh, options, session, report);
     } else {

@@ -95,13 +95,15 @@ Found find_on_lattice(const Mesh& mesh, const SampleArguments& options, const Ru
     return found;
 }
 
+constexpr double kManyNearBorder = 0.01; // of the points, from which on an open mesh is told of
+
 void warn_of_doubts(const Found& found, const std::string& input, Session& session) {
     if (const std::string turned = outward_sentence(found.inside.outward); !turned.empty())
         session.warn(input + ": " + turned);
     if (found.points.empty())
         session.warn(fmt::format("{}: no point is inside; take a smaller spacing than {:.4g}.", input, found.spacing));
     const auto& winding = found.inside.winding;
-    if (found.inside.used == InsideMethod::winding && winding.open_edges > 0)
+    if (found.inside.used == InsideMethod::winding && winding.open_edges > 0 && winding.near_half > kManyNearBorder)
         session.warn(
             fmt::format("{}: is not closed ({} edges do not close), so winding numbers decided; {:.2g} % of the "
                         "points were near the border between inside and outside.",
@@ -120,10 +122,13 @@ Report make_report(const Found& found, const std::string& output) {
     report.set("lattice", found.counts);
     report.set("lattice_origin", found.origin);
     report.add("spacing", fmt::format("{:.6g} units", found.spacing), "spacing_units", found.spacing);
-    report.add(
-        "method",
-        fmt::format("{} in {}, set up in {}", method, seconds_text(inside.seconds), seconds_text(inside.setup_seconds)),
-        "method", method);
+    report.add("method",
+               fmt::format("{}{} in {}, set up in {}", method,
+                           inside.winding.open_edges > 0
+                               ? fmt::format(", as {} edges do not close", with_commas(inside.winding.open_edges))
+                               : "",
+                           seconds_text(inside.seconds), seconds_text(inside.setup_seconds)),
+               "method", method);
     if (inside.used == InsideMethod::scan)
         report.row("crossings",
                    fmt::format("{} ({} decided in integers, {} in expansions)", with_commas(scan.crossings),

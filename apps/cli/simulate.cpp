@@ -360,6 +360,8 @@ void Run::report() const {
     report.set("outputs", options_.outputs);
     report_run(scene_, ready_, *run_, report);
     report_finer(ready_, finer_, report);
+    const std::optional<std::string> doubt = run_->broke_down();
+    report.set("doubt", doubt ? Json(*doubt) : Json());
     if (!options_.outputs.empty())
         report.row("written", fmt::format("{} in {}", fmt::join(options_.outputs, ", "), seconds_text(write_seconds_)));
     if (!options_.save.empty()) report.row("state", options_.save);

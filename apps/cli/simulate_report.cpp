@@ -31,17 +31,31 @@ Json body_json(const ReadyBody& body) {
             {"driver_vertices", body.model.driver().vertices.size()}};
 }
 
-void report_body(const ReadyBody& body, Report& report) {
-    report.row(body.name,
+/// Whether a row for people is of it: of repeated bodies the first has one, for all.
+bool has_row(const ReadyScene& ready, std::size_t b) {
+    return ready.bodies[b].group.empty() || b == 0 || ready.bodies[b - 1].group != ready.bodies[b].group;
+}
+
+std::string row_name(const ReadyScene& ready, std::size_t b) {
+    const ReadyBody& body = ready.bodies[b];
+    if (body.group.empty()) return body.name;
+    return fmt::format("{}, {} times", body.group, std::ranges::count(ready.bodies, body.group, &ReadyBody::group));
+}
+
+void report_body(const ReadyScene& ready, std::size_t b, Report& report) {
+    const ReadyBody& body = ready.bodies[b];
+    report.set("bodies").push_back(body_json(body));
+    if (!has_row(ready, b)) return;
+    report.row(row_name(ready, b),
                fmt::format("{} particles, {} cells of {:.3g} m; {:.4g} kg, {:.4g} m^3; {} vertices by a driver of {}",
                            with_commas(body.body->particle_count()), with_commas(body.body->cells.cells.size()),
                            body.body->spacing(), body.report.mass, body.report.cells.volume,
                            with_commas(body.model.vertex_count()), with_commas(body.model.driver().vertices.size())));
-    report.set("bodies").push_back(body_json(body));
 }
 
 /// How fine the driver is, and the errors that follow; those of a body that melts follow from no rule.
-void report_driver(const ReadyBody& body, const PoseSequence& poses, Json& json, Report& report) {
+void report_driver(const ReadyScene& ready, std::size_t b, const PoseSequence& poses, Json& json, Report& report) {
+    const ReadyBody& body = ready.bodies[b];
     const DriverEdges& edges = body.driver;
     std::string text = fmt::format("edges {:.2g} spacings on average, {:.2g} at most", edges.mean, edges.longest);
     json = {{"mean_edge", edges.mean}, {"longest_edge", edges.longest}, {"on_long_edges", edges.on_long_edges}};
@@ -51,7 +65,7 @@ void report_driver(const ReadyBody& body, const PoseSequence& poses, Json& json,
                             error.driver);
         json["expected"] = {{"spacing", error.spacing}, {"driver", error.driver}};
     }
-    report.row(body.name + ", driver", text);
+    if (has_row(ready, b)) report.row((body.group.empty() ? body.name : body.group) + ", driver", text);
 }
 
 /// What broke, and when. Times that have not come are null.
@@ -74,21 +88,6 @@ void report_fracture(const ReadyBody& body, const FractureReport& broken, Json& 
                           with_commas(broken.parts), with_commas(broken.pieces), broken.first, broken.broken_area,
                           broken.crack_area, broken.dissipated)
             : fmt::format("none; {} pieces hold", with_commas(broken.pieces)));
-}
-
-/// Why descent took over, where it did.
-void report_descent(const DescentCauses& causes, Report& report) {
-    std::vector<std::string> reasons;
-    const auto add = [&](std::uint64_t frames, const char* reason) {
-        if (frames > 0) reasons.push_back(fmt::format("{} {}", with_commas(frames), reason));
-    };
-    add(causes.chosen, "because the scene says so");
-    add(causes.too_many_substeps, "that would have taken too many substeps");
-    add(causes.not_finite, "that came to no finite numbers and were done again");
-    if (!reasons.empty()) report.row("frames by descent", fmt::format("{}", fmt::join(reasons, ", ")));
-    report.set("descent_causes", {{"chosen", causes.chosen},
-                                  {"too_many_substeps", causes.too_many_substeps},
-                                  {"not_finite", causes.not_finite}});
 }
 
 /// A frame's milliseconds, on average.
@@ -128,18 +127,15 @@ void report_frames(const SceneFile& scene, const SceneRun& run, Report& report) 
     report.add("frames", fmt::format("{} of {}, at {} a second", t.frames, scene.frames, scene.step.frames_per_second),
                "frames", t.frames);
     report.set("frames_per_second", scene.step.frames_per_second);
-    report.set("explicit_frames", t.explicit_frames);
-    report.set("descent_frames", t.descent_frames);
-    report.add("substeps",
-               fmt::format("{} to {} a frame, {:.3g} on average; {} frames explicit, {} by descent", least,
-                           t.most_substeps, mean, t.explicit_frames, t.descent_frames),
-               "substeps", {{"min", least}, {"mean", mean}, {"max", t.most_substeps}});
-    report_descent(run.descent_causes(), report);
+    report.add("substeps", fmt::format("{} to {} a frame, {:.3g} on average", least, t.most_substeps, mean), "substeps",
+               {{"min", least}, {"mean", mean}, {"max", t.most_substeps}});
     report_times(run.times(), report);
     report_totals(t, report);
     const Energy end = run.energy();
     report.add("energy at the start", energy_text(t.start), "energy_start", energy_json(t.start));
     report.add("and at the end", energy_text(end), "energy_end", energy_json(end));
+    for (const std::string& note : run.notes()) report.row("note", note);
+    report.set("notes", run.notes());
     if (t.clamped_particles) report.row("clamped", with_commas(t.clamped_particles) + " motions of particles");
     report.set("clamped_particles", t.clamped_particles);
 }
@@ -180,9 +176,9 @@ void report_checks(const ReadyScene& ready, const SceneRun& run, Report& report)
 
 void report_run(const SceneFile& scene, const ReadyScene& ready, const SceneRun& run, Report& report) {
     report.set("bodies", Json::array());
-    for (const ReadyBody& body : ready.bodies) report_body(body, report);
+    for (std::size_t b = 0; b < ready.bodies.size(); ++b) report_body(ready, b, report);
     for (std::size_t b = 0; b < ready.bodies.size(); ++b)
-        report_driver(ready.bodies[b], run.recording().poses[b], report.set("bodies").at(b)["driver"], report);
+        report_driver(ready, b, run.recording().poses[b], report.set("bodies").at(b)["driver"], report);
     for (std::size_t b = 0; b < ready.bodies.size(); ++b)
         if (run.fracture(b).breaks)
             report_fracture(ready.bodies[b], run.fracture(b), report.set("bodies").at(b)["fracture"], report);

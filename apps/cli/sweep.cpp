@@ -124,7 +124,16 @@ public:
         report.set("output", options_.output);
         report.set("runs", runs_.size());
         report.set("seconds", seconds);
+        report.set("doubtful_runs", doubtful_);
         session_.print(report);
+    }
+
+    /// Throws where rows of the table are not to be trusted; of the runs that this process made.
+    void doubt() const {
+        if (doubtful_.empty()) return;
+        throw Doubt{fmt::format("{}: {} broke down (run {}), so {} rows are not to be trusted; the warnings say why.",
+                                options_.output, counted(doubtful_.size(), "run"), fmt::join(doubtful_, ", "),
+                                doubtful_.size() == 1 ? "its" : "their")};
     }
 
     void make_chunk() {
@@ -201,7 +210,7 @@ private:
     std::string header() const {
         std::string line = "run,scene";
         for (const Setting& setting : settings_) line += ',' + field(setting.name);
-        line += ",body,particles,driver_vertices,mass_kg,frames,explicit_frames,substeps,least_volume_ratio,"
+        line += ",body,particles,driver_vertices,mass_kg,frames,substeps,least_volume_ratio,"
                 "most_stretch,most_contacts,deepest_contact_m,energy_start_j,energy_end_j";
         if (options_.check)
             line += ",check_rms_mean,check_rms_worst,check_max_worst,check_normal_p95_deg_mean,"
@@ -211,13 +220,13 @@ private:
     }
 
     /// A line a body.
-    Result<std::string> rows(std::size_t run) const {
+    Result<std::string> rows(std::size_t run) {
         const Result<std::string> lines = simulated(run);
         if (lines || lines.error().code == ErrorCode::cancelled) return lines;
         return Error{lines.error().code, fmt::format("{}: {}", name_of(run), lines.error().message)};
     }
 
-    Result<std::string> simulated(std::size_t number) const {
+    Result<std::string> simulated(std::size_t number) {
         const RunContext quiet = session_.silent_context();
         Result<SceneFile> scene = read(number);
         if (!scene) return scene.error();
@@ -236,6 +245,7 @@ private:
         }
         for (const auto& warnings : {ready->warnings, run->warnings()})
             for (const std::string& warning : warnings) session_.warn(fmt::format("{}: {}", name_of(number), warning));
+        if (run->broke_down()) doubtful_.push_back(number + 1);
         std::string lines;
         for (std::size_t b = 0; b < ready->bodies.size(); ++b)
             lines += runs_[number].label + line_of(ready->bodies[b], *run, b, finer) + '\n';
@@ -247,11 +257,10 @@ private:
                         const std::vector<FinerCheck>& finer) const {
         const RunTotals& t = run.recording().totals;
         const double frames = double(std::max<std::uint64_t>(t.frames, 1));
-        std::string line =
-            fmt::format(",{},{},{},{},{},{},{},{},{},{},{},{},{}", field(body.name), body.body->particle_count(),
-                        body.model.driver().vertices.size(), body.report.mass, t.frames, t.explicit_frames, t.substeps,
-                        t.least_volume_ratio, t.most_stretch, t.most_contacts, t.deepest_contact, t.start.total(),
-                        run.energy().total());
+        std::string line = fmt::format(",{},{},{},{},{},{},{},{},{},{},{},{}", field(body.name),
+                                       body.body->particle_count(), body.model.driver().vertices.size(),
+                                       body.report.mass, t.frames, t.substeps, t.least_volume_ratio, t.most_stretch,
+                                       t.most_contacts, t.deepest_contact, t.start.total(), run.energy().total());
         if (options_.check) {
             const CheckTotals& check = run.recording().checks[b];
             line += fmt::format(",{},{},{},{},{}", check.rms_sum / frames, check.worst_rms, check.worst_max,
@@ -269,6 +278,7 @@ private:
     std::vector<Choice> runs_;
     std::string job_; ///< all scenes as they are run
     std::vector<fs::path> meshes_;
+    std::vector<std::size_t> doubtful_; ///< runs, from 1
 };
 
 void run(const SweepArguments& options, Session& session) {
@@ -278,6 +288,7 @@ void run(const SweepArguments& options, Session& session) {
     if (!options.chunk.empty()) (void)chunk_of(options.chunk);
     Sweep sweep(options, session);
     options.chunk.empty() ? sweep.make() : sweep.make_chunk();
+    sweep.doubt();
 }
 
 } // namespace
@@ -302,9 +313,8 @@ Command sweep_command() {
                     Option("--finer", options->finer, "Also how far they are from those of eight times the particles"),
                     Option("--chunk", options->chunk,
                            "K/N: the K-th of N parts of the runs alone, while other processes do the others")},
-            .examples =
-                "  filigree sweep bounce.toml -o table.csv --set body.young_modulus=1e4,1e5,1e6 --check\n"
-                "  filigree sweep a.toml b.toml -o table.csv --set simulation.mode=explicit,descent --chunk 3/40",
+            .examples = "  filigree sweep bounce.toml -o table.csv --set body.young_modulus=1e4,1e5,1e6 --check\n"
+                        "  filigree sweep a.toml b.toml -o table.csv --set simulation.mode=auto,explicit --chunk 3/40",
             .run = [options](Session& session) { run(*options, session); }};
 }
 

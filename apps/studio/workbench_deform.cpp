@@ -67,8 +67,6 @@ void Workbench::begin_pull(Index vertex, const Vec3d& at) {
     const Vec3f rest = mesh.positions[vertex];
     if (mode_ == Mode::body) {
         if (!playback_.has_body()) return Q_EMIT told("A recording cannot be pulled: make the body first.", false);
-        if (playback_.made()->body->material.model == MaterialModel::mpm)
-            return Q_EMIT told("Bodies of the grid method cannot be pulled: hold the torch to them (H).", false);
         impl_->replay.stop();
         show_last_frame();
         is_pulling_ = true;

@@ -8,12 +8,10 @@
 
 namespace filigree {
 
-/// A box, a metre along x, with its corners shaken by a tenth of the spacing, and a step from there.
+/// A box, a metre along x, with its corners shaken by a tenth of the spacing.
 struct ShakenBox {
     Body body;
     Vectors positions;
-    std::vector<float> inertia;
-    std::vector<std::uint8_t> fixed, touched;
 
     explicit ShakenBox(const std::array<std::size_t, 3>& corners) {
         const double h = 1.0 / static_cast<double>(corners[0] - 1);
@@ -28,10 +26,6 @@ struct ShakenBox {
             body.rest.set(i, rest);
             positions.set(i, rest + float(h) * Vec3f(shift(random), shift(random), shift(random)));
         }
-        const double dt = 1.0 / 240;
-        inertia.assign(count, float(body.material.density * h * h * h / (dt * dt)));
-        fixed.assign(count, 0);
-        touched.assign(count, 0);
     }
     std::size_t cell_count() const { return body.cells.cells.size(); }
 };

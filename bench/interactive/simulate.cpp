@@ -57,8 +57,7 @@ public:
 struct Timing {
     std::vector<Phases> frames;
     std::vector<unsigned> substeps; ///< of each frame
-    std::size_t descent_frames = 0;
-    std::string state; ///< at the end
+    std::string state;              ///< at the end
 
     double mean(double (*value)(const Phases&)) const {
         double sum = 0;
@@ -93,7 +92,6 @@ void time_run(const Scene& scene, const RunContext& context, Follower* follower,
         }
         timing.frames.push_back(phases);
         timing.substeps.push_back(report.substeps);
-        timing.descent_frames += report.used == StepMode::descent;
     }
     timing.state = simulation.save();
 }
@@ -247,7 +245,7 @@ public:
         one_thread_.seed = context.seed;
     }
 
-    /// Elastic forces and descent sweeps of the fem material, beside the plain loop.
+    /// Elastic forces of the fem material, beside the plain loop.
     void elastic() {
         const ShakenBox box(cube(8000));
         const double cells = double(box.cell_count());
@@ -260,17 +258,13 @@ public:
             add(fmt::format("forces.lanes_{}", lanes), cells / seconds, "cells/s");
         }
         add("forces.of_plain", plain / seconds, "ratio");
-        for (const int lanes : cell_kernel::lane_counts())
-            add(fmt::format("sweep.lanes_{}", lanes), cells / time_sweep(box, lanes, one_thread_), "cells/s");
         for (const std::size_t size : sizes({8000, 200000})) {
             const ShakenBox some(cube(size));
             const int lanes = cell_kernel::lane_counts().back();
-            const double f = time_forces(some, lanes, context_), s = time_sweep(some, lanes, context_);
+            const double f = time_forces(some, lanes, context_);
             add(fmt::format("forces.of_{}", size), double(some.cell_count()) / f, "cells/s");
-            add(fmt::format("sweep.of_{}", size), double(some.cell_count()) / s, "cells/s");
             if (!has_more_threads()) continue;
             add(fmt::format("forces.of_{}.gain", size), time_forces(some, lanes, one_thread_) / f, "ratio");
-            add(fmt::format("sweep.of_{}.gain", size), time_sweep(some, lanes, one_thread_) / s, "ratio");
         }
     }
 
@@ -384,12 +378,6 @@ private:
         cell_kernel::Sums sums;
         return least_seconds([&] { cell_kernel::forces(plan, box.positions, result, sums, lanes, context); });
     }
-    static double time_sweep(const ShakenBox& box, int lanes, const RunContext& context) {
-        const cell_kernel::Plan plan = cell_kernel::make_plan(box.body);
-        Vectors positions = box.positions;
-        const Descent descent{box.positions, box.inertia, box.fixed, box.touched};
-        return least_seconds([&] { cell_kernel::sweep(plan, positions, descent, lanes, context); });
-    }
 
     /// The frame's time; with more threads than one, what they gain and whether they compute the same.
     Timing time_both(const std::string& name, const Scene& scene, Follower* follower = nullptr) {
@@ -426,7 +414,6 @@ private:
         add(name + ".rate", 1 / frame, "frames/s");
         add(name + ".particles", double(scene.actor.body->particle_count()), "particles");
         add(name + ".substeps", timing.mean_substeps(), "substeps");
-        add(name + ".descent_frames", double(timing.descent_frames), "frames");
         add(name + ".direct", 1e3 * direct, "ms");
         add(name + ".direct_of_restored", direct / coupled, "ratio");
         add(name + ".frame_with_direct_of_restored", (frame - coupled + direct) / frame, "ratio");

@@ -17,7 +17,7 @@ import python_reference
 # The manual's order: what a reader needs first stands first. Every page of docs/ is in one of these.
 PARTS = {
     "First steps": ["command-line", "python", "blender", "studio", "gallery"],
-    "Guides": ["blend-code", "coding", "handles", "bodies", "scenes", "fracture", "melting", "remesh", "inside-points", "rendering", "exchange", "cluster", "web"],
+    "Guides": ["blend-code", "coding", "handles", "bodies", "bodies-theory", "scenes", "fracture", "melting", "remesh", "inside-points", "rendering", "exchange", "cluster", "web"],
     "File formats": ["formats", "animations", "fil-format"],
     "How it works": ["reference-code", "figures", "benchmarks", "reliability", "conventions", "architecture", "contributing"],
 }

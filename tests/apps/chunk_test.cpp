@@ -130,7 +130,7 @@ protected:
     /// Its table is `folder`/t.csv, of 6 runs.
     static std::vector<std::string> sweep(const std::string& folder, const std::string& chunk = "") {
         return with_chunk({"sweep", "drop.toml", "-o", folder + "/t.csv", "--set", "body.young_modulus=1e5,2e5,3e5",
-                           "--set", "simulation.mode=explicit,descent", "--check"},
+                           "--set", "simulation.mode=auto,explicit", "--check"},
                           chunk);
     }
     /// Its pictures are `folder`/p_1.png to p_5.png.
@@ -189,7 +189,7 @@ TEST_F(ChunkedItems, ASweepInAnyOrderIsTheSameTable) {
     const std::string table = bytes_of(path("a/t.csv"));
     EXPECT_EQ(std::ranges::count(table, '\n'), 7);
     EXPECT_TRUE(table.starts_with("run,scene,body.young_modulus,simulation.mode,body,"));
-    EXPECT_NE(table.find("\n6,drop.toml,3e5,descent,cube,"), std::string::npos) << table;
+    EXPECT_NE(table.find("\n6,drop.toml,3e5,explicit,cube,"), std::string::npos) << table;
 }
 
 TEST_F(ChunkedItems, PicturesInAnyOrderAreTheSame) {
@@ -334,7 +334,7 @@ private:
 
 TEST_F(KilledEverywhere, ATableIsTheOldOrTheNew) {
     std::vector<std::string> older = sweep("a", "1/1");
-    older[7] = "simulation.mode=descent,explicit";
+    older[7] = "simulation.mode=explicit,auto";
     kill_everywhere(sweep, older);
 }
 

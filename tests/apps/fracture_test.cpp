@@ -79,6 +79,14 @@ TEST_F(FractureCommand, SentencesSayWhatToDoNext) {
     EXPECT_EQ(ok({"fracture", "cube.obj", "-o", "x.ply", "--explode", "0.2"}).out.find("--explode"), std::string::npos);
 }
 
+TEST_F(FractureCommand, ObjectsThatPiecesReplaceAreNoWarning) {
+    make_cube();
+    ASSERT_EQ(run_shell("sed '0,/^f /s//o cube\\nf /' cube.obj > named.obj").code, 0);
+    EXPECT_EQ(json({"fracture", "named.obj", "-o", "broken.obj", "--pieces", "5"}).at("warnings"), Json::array());
+    EXPECT_NE(ok({"fracture", "named.obj", "-o", "broken.obj", "--pieces", "5"}).out.find("replaced by the pieces"),
+              std::string::npos);
+}
+
 TEST_F(FractureCommand, PiecesAreNamedInEveryFormat) {
     make_cube();
     for (const char* file : {"broken.obj", "broken.glb", "broken.ply", "broken.stl"})

@@ -2,7 +2,6 @@
 #include "filigree/core/dense_solve.h"
 #include "filigree/physics/body.h"
 #include "filigree/physics/fem/cell_kernel.h"
-#include "filigree/physics/fem/vertex_block.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>
@@ -110,21 +109,33 @@ struct PlainCell {
         Corners X = Corners::Zero(), dX = Corners::Zero();
         for (int m = 1; m < 8; ++m)
             for (int c = 0; c < 8; ++c) X.col(m) += sign(m, c) * x.col(c);
-        double I = 0;
-        for (int m = 1; m < 8; ++m) I += share(m) * X.col(m).squaredNorm() / (16 * h * h);
+        double I = 0, bent = 0;
+        for (int m = 1; m < 8; ++m) {
+            const double square = share(m) * X.col(m).squaredNorm() / (16 * h * h);
+            I += square;
+            if (m != 1 && m != 2 && m != 4) bent += square;
+        }
         Mat3d F;
         F << X.col(1), X.col(2), X.col(4);
         F /= 4 * h;
         const double J = F.determinant(), V = h * h * h;
         Mat3d cofactor;
         cofactor << F.col(1).cross(F.col(2)), F.col(2).cross(F.col(0)), F.col(0).cross(F.col(1));
-        for (int m = 1; m < 8; ++m) dX.col(m) = V * shear * (1 - 1 / (I + 1)) * share(m) * X.col(m) / (16 * h * h);
-        for (int axis = 0; axis < 3; ++axis) dX.col(1 << axis) += V * bulk * (J - g) * cofactor.col(axis) / (4 * h);
+        const double over = std::max(bent - 0.02, 0.0), part = std::min(over, 0.5);      // what is bent much
+        const double crush = std::clamp(0.4 - J, 0.0, 0.4), hard = 100 * (bulk + shear); // what is crushed
+        for (int m = 1; m < 8; ++m) {
+            const double more = m == 1 || m == 2 || m == 4 ? 0 : 500 * part * part;
+            dX.col(m) = V * shear * (1 - 1 / (I + 1) + more) * share(m) * X.col(m) / (16 * h * h);
+        }
+        for (int axis = 0; axis < 3; ++axis)
+            dX.col(1 << axis) += V * (bulk * (J - g) - hard * crush * crush) * cofactor.col(axis) / (4 * h);
         gradient.setZero();
         for (int m = 1; m < 8; ++m)
             for (int c = 0; c < 8; ++c) gradient.col(c) += sign(m, c) * dX.col(m);
         return V * (shear / 2 * (I - 3) + bulk / 2 * (J - g) * (J - g) - shear / 2 * std::log((I + 1) / 4) -
-                    bulk / 2 * (1 - g) * (1 - g));
+                    bulk / 2 * (1 - g) * (1 - g) +
+                    shear * 500 * (part * part * part / 6 + part * part * (over - part) / 2) +
+                    hard * (crush * crush * crush / 3 + 0.16 * std::max(-J, 0.0)));
     }
 };
 
@@ -178,7 +189,7 @@ TEST(CellElasticity, ForcesAreMinusTheDerivativeOfTheEnergy) {
             for (std::size_t corner = 0; corner < x.size(); corner += x.size() / 8)
                 for (const auto axis : {0, 1, 2}) {
                     float& p = (axis == 0 ? x.x : axis == 1 ? x.y : x.z)[corner];
-                    const float middle = p, step = 2e-3f * h;
+                    const float middle = p, step = 2.5e-4f * h;
                     p = middle + step;
                     const double after = elasticity->energy(x, kOneThread), high = p;
                     p = middle - step;
@@ -286,7 +297,11 @@ TEST(CellElasticity, RateBoundsTheLargestEigenvalue) {
                 // Not so cautious that steps would be wasted; shrunk bodies are soft, and step as if at rest.
                 ElasticReport at_rest;
                 forces_of(body, body.rest, &at_rest);
-                EXPECT_LE(report.squared_frequency, std::max<double>(8 * exact, 2 * at_rest.squared_frequency))
+                // For cells that are crushed, or about to be, the bound looks ahead (kCrushSoon).
+                const bool looks_ahead = report.least_volume_ratio < cell_kernel::kCrushFrom + cell_kernel::kCrushSoon;
+                EXPECT_LE(report.squared_frequency,
+                          std::max<double>((looks_ahead ? 40 : 8) * exact,
+                                           (looks_ahead ? 16 : 2) * at_rest.squared_frequency))
                     << state.name << ", nu " << poisson_ratio;
             }
         }
@@ -310,7 +325,10 @@ TEST(CellElasticity, ExplicitStepsWithinTheBoundAreStable) {
         const double start = elasticity->energy(x, kOneThread);
         double most = 0, time = 0;
         for (int step = 0; step < 2000 && time < 1; ++step) {
-            const float dt = 1.9f / std::sqrt(elasticity->forces(x, forces, kOneThread).squared_frequency);
+            float fastest = 0; // particles beside each other go no further than the stepper lets them
+            for (std::size_t i = 0; i < v.size(); ++i) fastest = std::max(fastest, v[i].norm());
+            const float dt = std::min(1.9f / std::sqrt(elasticity->forces(x, forces, kOneThread).squared_frequency),
+                                      0.25f * 0.1f / (fastest + 1e-9f));
             ASSERT_TRUE(std::isfinite(dt) && dt > 0) << state.name;
             double kinetic = 0;
             for (std::size_t i = 0; i < x.size(); ++i) {
@@ -326,170 +344,33 @@ TEST(CellElasticity, ExplicitStepsWithinTheBoundAreStable) {
     }
 }
 
-/// A state and what a sweep minimises.
-struct Problem {
-    Vectors target;
-    std::vector<float> inertia;
-    std::vector<std::uint8_t> fixed, touched;
-    Problem(const Body& body, double dt) : target(body.rest), fixed(body.rest.size(), 0), touched(body.rest.size(), 0) {
-        for (const float m : body.mass) inertia.push_back(float(m / (dt * dt)));
-    }
-    Descent descent(const BlockTerms* external = nullptr) const { return {target, inertia, fixed, touched, external}; }
-    double potential(Elasticity& elasticity, const Vectors& x) const {
-        double sum = elasticity.energy(x, kOneThread);
-        for (std::size_t i = 0; i < x.size(); ++i)
-            sum += 0.5 * inertia[i] * (x[i].cast<double>() - target[i].cast<double>()).squaredNorm();
-        return sum;
-    }
-    /// Largest force that is left, N.
-    double residual(Elasticity& elasticity, const Vectors& x, std::size_t only = kNoIndex) const {
-        Vectors forces(x.size());
-        elasticity.forces(x, forces, kOneThread);
-        double most = 0;
-        for (std::size_t i = 0; i < x.size(); ++i)
-            if (only == kNoIndex || i == only)
-                most = std::max<double>(most, (forces[i] + inertia[i] * (target[i] - x[i])).cwiseAbs().maxCoeff());
-        return most;
-    }
-};
-
-TEST(CellSweep, SolvesAVertexAlone) {
-    for (const Body& body : bodies())
-        for (const State& state : states()) {
-            const auto elasticity = make_cell_elasticity(body, kOneThread);
-            for (std::size_t vertex = 0; vertex < body.rest.size(); vertex += 1 + body.rest.size() / 12) {
-                Vectors x = shaken(mapped(body.rest, state.map), state.shake * 0.1f);
-                Problem problem(body, 1.0 / 60);
-                problem.fixed.assign(x.size(), 1);
-                problem.fixed[vertex] = 0;
-                const Vectors start = x;
-                const double before = problem.potential(*elasticity, x),
-                             force = problem.residual(*elasticity, x, vertex);
-                elasticity->sweep(x, problem.descent(), kOneThread);
-                // A collapsed cell is as good as soft, so what comes out of it may go too far at first.
-                if (state.name != "shrunk") {
-                    EXPECT_LE(problem.potential(*elasticity, x), before * (1 + 1e-7)) << state.name;
-                }
-                // Quadratic but for the logarithm: Newton's method is done after a few.
-                for (int i = 0; i < 4; ++i) elasticity->sweep(x, problem.descent(), kOneThread);
-                EXPECT_LT(problem.residual(*elasticity, x, vertex), 1e-4 * force + 0.02) << state.name;
-                for (std::size_t i = 0; i < x.size(); ++i) EXPECT_TRUE(i == vertex || x[i] == start[i]) << i;
-            }
-        }
-}
-
-TEST(CellSweep, NeverRaisesThePotential) {
-    for (const Body& body : bodies())
-        for (const State& state : states())
-            for (const double dt : {1e-3, 1.0 / 60, 0.1}) {
-                const auto elasticity = make_cell_elasticity(body, kOneThread);
-                Vectors x = shaken(mapped(body.rest, state.map), state.shake * 0.1f);
-                Problem problem(body, dt);
-                problem.target = x;
-                double before = problem.potential(*elasticity, x);
-                const double first = before;
-                for (int i = 0; i < 30; ++i) {
-                    elasticity->sweep(x, problem.descent(), kOneThread);
-                    const double after = problem.potential(*elasticity, x);
-                    EXPECT_LE(after, before + 1e-6 * first) << state.name << ", dt " << dt << ", sweep " << i;
-                    before = after;
-                }
-                EXPECT_LT(before, first) << state.name;
-            }
-}
-
-TEST(CellSweep, ConvergesToTheMinimum) {
-    const Body body = make_body(with_random_fractions(box_cells(4, 3, 5, 0.1)), {});
-    const auto elasticity = make_cell_elasticity(body, kOneThread);
-    Problem problem(body, 1.0 / 60);
-    problem.target = shaken(body.rest, 0.05f);
-    for (std::size_t i = 0; i < 9; ++i) problem.fixed[i] = 1;
-    Vectors x = body.rest;
-    for (int i = 0; i < 200; ++i) elasticity->sweep(x, problem.descent(), kOneThread);
-    Vectors forces(x.size());
-    elasticity->forces(x, forces, kOneThread);
-    for (std::size_t i = 0; i < x.size(); ++i) {
-        if (problem.fixed[i]) continue;
-        const Vec3f inertia = problem.inertia[i] * (problem.target[i] - x[i]);
-        EXPECT_LT((forces[i] + inertia).norm(), 2e-3) << inertia.norm(); // of up to 20 N
-    }
-}
-
-/// A spring to the origin.
-class Tether final : public BlockTerms {
-public:
-    void add(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const override {
-        force -= 500.0f * positions[particle];
-        block.add_scaled_identity(500.0f);
-    }
-};
-
-TEST(CellSweep, AsksForExternalTermsWhereTouched) {
-    const Body body = make_body(box_cells(1, 1, 1, 0.1), {});
-    const auto elasticity = make_cell_elasticity(body, kOneThread);
-    Problem problem(body, 1.0 / 60);
-    problem.touched[3] = 1;
-    const Tether tether;
-    Vectors x = body.rest;
-    for (int i = 0; i < 300; ++i) elasticity->sweep(x, problem.descent(&tether), kOneThread);
-    Vectors forces(x.size());
-    elasticity->forces(x, forces, kOneThread);
-    for (std::size_t i = 0; i < x.size(); ++i) {
-        const Vec3f inner = forces[i] + problem.inertia[i] * (problem.target[i] - x[i]);
-        EXPECT_LT((inner - (i == 3 ? Vec3f(500.0f * x[i]) : Vec3f(Vec3f::Zero()))).norm(), 1e-3) << i;
-    }
-    EXPECT_GT((500.0f * x[3]).norm(), 1);
-}
-
 TEST(CellKernel, SameBytesForAnyLanesAndThreads) {
     const RunContext two(2);
     std::vector<Body> all = bodies();
     all.push_back(make_body(box_cells(20, 20, 20, 0.1), {}));
-    const Tether tether;
     for (const Body& body : all)
         for (const State& state : states()) {
             const cell_kernel::Plan plan = cell_kernel::make_plan(body);
             const Vectors start = shaken(mapped(body.rest, state.map), state.shake * 0.1f);
-            Problem problem(body, 1.0 / 60);
-            for (std::size_t i = 0; i < start.size(); i += 3) problem.touched[i] = 1;
-            for (std::size_t i = 0; i < start.size(); i += 5) problem.fixed[i] = 1;
-            Vectors expected_forces, expected_positions;
+            Vectors expected_forces;
             ElasticReport expected;
             for (const int lanes : cell_kernel::lane_counts())
                 for (const RunContext* context : {&kOneThread, &two}) {
-                    Vectors forces(start.size()), positions = start;
+                    Vectors forces(start.size());
                     cell_kernel::Sums sums;
                     const ElasticReport report = cell_kernel::forces(plan, start, forces, sums, lanes, *context);
-                    cell_kernel::sweep(plan, positions, problem.descent(&tether), lanes, *context);
                     if (expected_forces.size() == 0) {
                         expected_forces = forces;
-                        expected_positions = positions;
                         expected = report;
                     }
                     EXPECT_EQ(forces.x, expected_forces.x) << state.name << lanes;
                     EXPECT_EQ(forces.y, expected_forces.y) << state.name << lanes;
                     EXPECT_EQ(forces.z, expected_forces.z) << state.name << lanes;
-                    EXPECT_EQ(positions.x, expected_positions.x) << state.name << lanes;
-                    EXPECT_EQ(positions.y, expected_positions.y) << state.name << lanes;
-                    EXPECT_EQ(positions.z, expected_positions.z) << state.name << lanes;
                     EXPECT_EQ(report.squared_frequency, expected.squared_frequency) << state.name << lanes;
                     EXPECT_EQ(report.least_volume_ratio, expected.least_volume_ratio) << state.name << lanes;
                     EXPECT_EQ(report.most_stretch, expected.most_stretch) << state.name << lanes;
                 }
         }
-}
-
-TEST(Symmetric3, Solves) {
-    Symmetric3 a;
-    a.add_scaled_identity(0.5f);
-    a.add_outer(Vec3f(1, 2, -1), 2);
-    a.add_outer(Vec3f(0, 1, 3), 0.25f);
-    Mat3f dense;
-    dense << a.xx, a.xy, a.xz, a.xy, a.yy, a.yz, a.xz, a.yz, a.zz;
-    const Vec3f b(3, -1, 2);
-    EXPECT_LT((dense * a.solve(b) - b).norm(), 1e-3);
-    EXPECT_EQ(Symmetric3{}.solve(b), Vec3f::Zero());
-    EXPECT_EQ(a.solve(Vec3f(0, std::numeric_limits<float>::infinity(), 0)), Vec3f::Zero());
 }
 
 TEST(CellElasticity, StretchAndShearSeeYoungsModulusAndPoissonsRatio) {

@@ -152,31 +152,34 @@ inline double expect_rate_is_a_bound(const Body& body, const Make& make) {
     return at_rest;
 }
 
-/// Implicit steps of ten sweeps from bad starts until the body is itself again.
-inline void expect_to_come_back(const Body& body, const Make& make, double dt) {
+/// Damped steps from bad starts until the body is itself again, which is within `seconds`.
+inline void expect_to_come_back(const Body& body, const Make& make, double seconds) {
+    constexpr double kDamping = 5; // 1/s
     const RunContext context;
     const std::size_t n = body.particle_count();
     double volume = 0;
     for (const float v : body.volume) volume += double(v);
-    std::vector<float> inertia(n);
-    for (std::size_t i = 0; i < n; ++i) inertia[i] = float(double(body.mass[i]) / (dt * dt));
-    const std::vector<std::uint8_t> none(n, 0);
     for (const Start& start : bad_starts(body)) {
         const auto elasticity = make(body, context);
         Vectors x = start.positions, velocity(n), forces(n);
-        ElasticReport report;
-        double energy = 0;
-        int steps = 0;
+        ElasticReport report = elasticity->forces(x, forces, context);
+        if (std::abs(report.least_volume_ratio) < 1e-12f) { // flat: as the stepper does, shaken apart first
+            const auto shift = [&](std::size_t k) { return float((random_unit(1, k) - 0.5) * 2e-3 * body.spacing()); };
+            for (std::size_t i = 0; i < n; ++i) x.add(i, {shift(3 * i), shift(3 * i + 1), shift(3 * i + 2)});
+            report = elasticity->forces(x, forces, context);
+        }
+        double energy = 0, time = 0;
         do {
-            const Vectors before = x;
-            Vectors target(n);
-            for (std::size_t i = 0; i < n; ++i) target.set(i, x[i] + float(dt * std::exp(-dt)) * velocity[i]);
-            for (int sweep = 0; sweep < 10; ++sweep)
-                elasticity->sweep(x, {target, inertia, none, none, nullptr}, context);
-            for (std::size_t i = 0; i < n; ++i) velocity.set(i, (x[i] - before[i]) / float(dt));
+            const double dt = 1.5 / std::sqrt(double(report.squared_frequency));
+            const auto kept = float(std::exp(-kDamping * dt));
+            for (std::size_t i = 0; i < n; ++i) {
+                velocity.set(i, kept * (velocity[i] + float(dt) / body.mass[i] * forces[i]));
+                x.add(i, float(dt) * velocity[i]);
+            }
             report = elasticity->forces(x, forces, context);
             energy = elasticity->energy(x, context) / (body.material.young_modulus * volume);
-        } while (++steps < 250 && !(energy < 1e-6 && report.least_volume_ratio > 0.9f));
+            time += dt;
+        } while (time < seconds && !(energy < 1e-6 && report.least_volume_ratio > 0.9f));
         EXPECT_LT(energy, 1e-6) << start.name;
         EXPECT_GT(report.least_volume_ratio, 0.9f) << start.name;
     }
@@ -189,13 +192,11 @@ inline bool same_bytes(const Vectors& a, const Vectors& b) {
     return same(a.x, b.x) && same(a.y, b.y) && same(a.z, b.z);
 }
 
-/// Forces, energy, report and a sweep with one thread and with two.
+/// Forces, energy and report with one thread and with two.
 inline void expect_same_bytes_for_threads(const Body& body, const Make& make) {
     const std::size_t n = body.particle_count();
-    const std::vector<float> inertia(n, body.mass[0] * 1e4f);
-    const std::vector<std::uint8_t> none(n, 0);
     for (const Start& state : states(body)) {
-        Vectors forces[2] = {Vectors(n), Vectors(n)}, swept[2] = {state.positions, state.positions};
+        Vectors forces[2] = {Vectors(n), Vectors(n)};
         ElasticReport reports[2];
         double energies[2];
         for (unsigned t = 0; t < 2; ++t) {
@@ -203,11 +204,8 @@ inline void expect_same_bytes_for_threads(const Body& body, const Make& make) {
             const auto elasticity = make(body, context);
             reports[t] = elasticity->forces(state.positions, forces[t], context);
             energies[t] = elasticity->energy(state.positions, context);
-            elasticity->sweep(swept[t], {state.positions, inertia, none, none, nullptr}, context);
         }
         EXPECT_TRUE(same_bytes(forces[0], forces[1])) << state.name;
-        EXPECT_TRUE(same_bytes(swept[0], swept[1])) << state.name;
-        EXPECT_FALSE(same_bytes(swept[0], state.positions)) << state.name;
         EXPECT_EQ(reports[0].squared_frequency, reports[1].squared_frequency);
         EXPECT_EQ(reports[0].least_volume_ratio, reports[1].least_volume_ratio);
         EXPECT_EQ(reports[0].most_stretch, reports[1].most_stretch);

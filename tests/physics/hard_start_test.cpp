@@ -62,7 +62,8 @@ TEST_P(HardStart, NeverNotFinite) {
         for (const double rate : {10.0, 60.0, 1000.0})
             for (const double young : {1e2, 1e5, 1e9}) {
                 const auto body = box(3, 3, 3, 0.25, material(GetParam(), young));
-                Simulation wild = simulation(with_ground(), {actor(body, {0, 0.2, 0})}, {.frames_per_second = rate});
+                Simulation wild = simulation(with_ground(), {actor(body, {0, 0.2, 0})},
+                                             {.frames_per_second = rate, .mode = StepMode::explicit_steps});
                 Vectors positions = wild.positions(0);
                 for (std::size_t i = 0; i < positions.size(); ++i) positions.set(i, float(scale) * positions[i]);
                 ASSERT_TRUE(wild.set_positions(0, positions).ok());
@@ -81,38 +82,38 @@ TEST_P(HardStart, NeverNotFinite) {
 
 // Larger bodies than BadStart's: what looks for contacts must bear them too.
 TEST_P(HardStart, ParticlesWithoutNumbersAreLeftToTheStepper) {
-    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent})
-        for (const std::size_t bodies : {1, 2}) {
-            const auto body = box(10, 10, 10, 0.1, material(GetParam(), 1e5));
-            Actor beside = actor(body);
-            beside.placement = Eigen::Translation3d(0, 1.05, 0);
-            std::vector<Actor> actors = {actor(body)};
-            if (bodies == 2) actors.push_back(beside);
-            for (const std::size_t lost : {std::size_t{0}, std::size_t{555}}) {
-                Simulation wild = Simulation::create(free_space(), actors, {.mode = mode}, RunContext(1)).value();
-                Vectors positions = wild.positions(0);
-                positions.x[lost] = std::numeric_limits<float>::quiet_NaN();
-                ASSERT_TRUE(wild.set_positions(0, positions).ok());
-                const auto report = wild.advance(RunContext(1));
-                EXPECT_TRUE(!report || all_finite(wild.positions(0)));
-            }
+    for (const std::size_t bodies : {1, 2}) {
+        const auto body = box(10, 10, 10, 0.1, material(GetParam(), 1e5));
+        Actor beside = actor(body);
+        beside.placement = Eigen::Translation3d(0, 1.05, 0);
+        std::vector<Actor> actors = {actor(body)};
+        if (bodies == 2) actors.push_back(beside);
+        for (const std::size_t lost : {std::size_t{0}, std::size_t{555}}) {
+            Simulation wild =
+                Simulation::create(free_space(), actors, {.mode = StepMode::explicit_steps}, RunContext(1)).value();
+            Vectors positions = wild.positions(0);
+            positions.x[lost] = std::numeric_limits<float>::quiet_NaN();
+            ASSERT_TRUE(wild.set_positions(0, positions).ok());
+            const auto report = wild.advance(RunContext(1));
+            EXPECT_TRUE(!report || all_finite(wild.positions(0)));
         }
+    }
 }
 
 TEST(HardStarts, ACrushedMeshfreeBodyDoesNotMeetAllOfItself) {
-    for (const StepMode mode : {StepMode::descent, StepMode::automatic})
-        for (const bool is_mixed : {false, true}) {
-            const auto body = box(12, 12, 12, 0.1, material(MaterialModel::meshfree, 1e5));
-            Simulation wild = Simulation::create(free_space(), {actor(body)}, {.mode = mode}, RunContext(1)).value();
-            Vectors positions = wild.positions(0);
-            for (std::size_t i = 0; i < positions.size(); ++i)
-                positions.set(i, is_mixed ? Vec3f(float(random_unit(7, 3 * i)), float(random_unit(7, 3 * i + 1)),
-                                                  float(random_unit(7, 3 * i + 2)))
-                                          : Vec3f(0.01f * positions[i]));
-            ASSERT_TRUE(wild.set_positions(0, positions).ok());
-            ASSERT_TRUE(wild.advance(RunContext(1)).ok()); // in a second; with all pairs of points in minutes
-            EXPECT_TRUE(all_finite(wild.positions(0)));
-        }
+    for (const bool is_mixed : {false, true}) {
+        const auto body = box(12, 12, 12, 0.1, material(MaterialModel::meshfree, 1e5));
+        Simulation wild =
+            Simulation::create(free_space(), {actor(body)}, {.mode = StepMode::explicit_steps}, RunContext(1)).value();
+        Vectors positions = wild.positions(0);
+        for (std::size_t i = 0; i < positions.size(); ++i)
+            positions.set(i, is_mixed ? Vec3f(float(random_unit(7, 3 * i)), float(random_unit(7, 3 * i + 1)),
+                                              float(random_unit(7, 3 * i + 2)))
+                                      : Vec3f(0.01f * positions[i]));
+        ASSERT_TRUE(wild.set_positions(0, positions).ok());
+        ASSERT_TRUE(wild.advance(RunContext(1)).ok()); // in a second; with all pairs of points in minutes
+        EXPECT_TRUE(all_finite(wild.positions(0)));
+    }
 }
 
 TEST(HardStarts, AHeavyBodyOnALightOne) {
@@ -191,26 +192,24 @@ TEST(HardStarts, ANoisyBodyGainsNoEnergy) {
 }
 
 TEST(HardStarts, ABodyThatHitsFasterThanItsWavesIsStoppedByTheGround) {
-    for (const MaterialModel model : {MaterialModel::fem, MaterialModel::springs, MaterialModel::meshfree})
-        for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
-            Material soft = material(model, 3e4);
-            soft.damping = 1;
-            const double spacing = 0.1;
-            Actor falling = actor(box(4, 4, 4, spacing, soft), {0, 0.2, 0});
-            falling.velocity = {0, -2.5 * std::sqrt(soft.young_modulus / soft.density), 0};
-            Simulation hit = simulation(with_ground(0), {falling}, {.mode = mode});
-            const Vectors& positions = hit.positions(0);
-            for (int frame = 0; frame < 300; ++frame) {
-                ASSERT_TRUE(hit.advance(RunContext(1)).ok());
-                const float lowest =
-                    *std::min_element(positions.y.begin(), positions.y.begin() + long(positions.size()));
-                ASSERT_GT(lowest, -1.5 * spacing) << int(model) << ", " << int(mode) << ", frame " << frame;
-                ASSERT_GT(centre_of_mass(hit).y(), -0.75 * spacing) << int(model) << ", " << int(mode);
-            }
-            if (model == MaterialModel::meshfree) continue; // stays crumpled
-            EXPECT_GT(centre_of_mass(hit).y(), 1.5 * spacing) << int(model) << ", " << int(mode);
-            EXPECT_LT(shape_error(hit), 0.5 * spacing) << int(model) << ", " << int(mode);
+    for (const MaterialModel model : {MaterialModel::fem, MaterialModel::springs, MaterialModel::meshfree}) {
+        Material soft = material(model, 3e4);
+        soft.damping = 1;
+        const double spacing = 0.1;
+        Actor falling = actor(box(4, 4, 4, spacing, soft), {0, 0.2, 0});
+        falling.velocity = {0, -2.5 * std::sqrt(soft.young_modulus / soft.density), 0};
+        Simulation hit = simulation(with_ground(0), {falling}, {.mode = StepMode::explicit_steps});
+        const Vectors& positions = hit.positions(0);
+        for (int frame = 0; frame < 300; ++frame) {
+            ASSERT_TRUE(hit.advance(RunContext(1)).ok());
+            const float lowest = *std::min_element(positions.y.begin(), positions.y.begin() + long(positions.size()));
+            ASSERT_GT(lowest, -1.5 * spacing) << int(model) << ", frame " << frame;
+            ASSERT_GT(centre_of_mass(hit).y(), -0.75 * spacing) << int(model);
         }
+        if (model == MaterialModel::meshfree) continue; // stays crumpled
+        EXPECT_GT(centre_of_mass(hit).y(), 1.5 * spacing) << int(model);
+        EXPECT_LT(shape_error(hit), 0.5 * spacing) << int(model);
+    }
 }
 
 // Cells that the surface only passes through have corners far outside of it.

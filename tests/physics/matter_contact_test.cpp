@@ -33,8 +33,9 @@ Actor put(std::shared_ptr<const Body> body, const Vec3d& at, double degrees = 0,
     return actor;
 }
 
-Simulation begin(World world, std::vector<Actor> actors, StepMode mode = StepMode::explicit_steps) {
-    return Simulation::create(std::move(world), std::move(actors), {.mode = mode}, kOneThread).value();
+Simulation begin(World world, std::vector<Actor> actors) {
+    return Simulation::create(std::move(world), std::move(actors), {.mode = StepMode::explicit_steps}, kOneThread)
+        .value();
 }
 
 /// Something at rest on a slope, or sliding down it. `on_body`: the slope is a body that is held fast.
@@ -72,23 +73,15 @@ struct Slope {
     }
 };
 
-class EachStepMode : public testing::TestWithParam<StepMode> {};
-INSTANTIATE_TEST_SUITE_P(MatterContact, EachStepMode, testing::Values(StepMode::explicit_steps, StepMode::descent),
-                         [](const testing::TestParamInfo<StepMode>& mode) {
-                             return mode.param == StepMode::descent ? "descent" : "explicit_steps";
-                         });
-
-// Descent is slow and comes to rest sooner.
-TEST_P(EachStepMode, ASquareStackStands) {
-    const bool descent = GetParam() == StepMode::descent;
-    const std::size_t bodies = descent ? 3 : 5;
-    const int seconds = descent ? 12 : 60;
+TEST(MatterContact, ASquareStackStands) {
+    const std::size_t bodies = 5;
+    const int seconds = 60;
     World world;
     world.obstacles.emplace_back().shape = HalfSpace{};
     std::vector<Actor> actors;
     const auto cube = block(3, 3, 3, 0.4 / 3, rubber(1e6, 0.5));
     for (std::size_t i = 0; i < bodies; ++i) actors.push_back(put(cube, Vec3d(0, 0.2 + 0.4 * double(i), 0)));
-    Simulation stack = begin(world, actors, GetParam());
+    Simulation stack = begin(world, actors);
     std::vector<Vec3d> before;
     for (int frame = 0; frame < 60 * seconds; ++frame) {
         ASSERT_TRUE(stack.advance(kOneThread).ok());
@@ -103,15 +96,14 @@ TEST_P(EachStepMode, ASquareStackStands) {
 }
 
 // Flat plates: a tower of five cubes would tip over.
-TEST_P(EachStepMode, AStackHoldsOnASlopeOfTwentyDegrees) {
-    const bool descent = GetParam() == StepMode::descent;
-    const std::size_t bodies = descent ? 3 : 5;
+TEST(MatterContact, AStackHoldsOnASlopeOfTwentyDegrees) {
+    const std::size_t bodies = 5;
     Slope slope(20, false, 0.5);
-    const std::size_t across = descent ? 3 : 6, high = descent ? 1 : 2;
+    const std::size_t across = 6, high = 2;
     const double spacing = 0.4 / double(across);
     const auto plate = block(across, high, across, spacing, rubber(1e6, 0.5));
     for (std::size_t i = 0; i < bodies; ++i) slope.add(plate, (0.5 + double(i)) * double(high) * spacing, 0, 0);
-    Simulation stack = begin(slope.world, slope.actors, GetParam());
+    Simulation stack = begin(slope.world, slope.actors);
     std::vector<Vec3d> before;
     for (int frame = 0; frame < 900; ++frame) {
         ASSERT_TRUE(stack.advance(kOneThread).ok());
@@ -122,12 +114,12 @@ TEST_P(EachStepMode, AStackHoldsOnASlopeOfTwentyDegrees) {
         EXPECT_LT((centre_of_mass(stack, b) - before[b]).norm() / 5, 1e-5) << "m/s, of body " << b;
 }
 
-TEST_P(EachStepMode, SlidingFollowsCoulombOnObstaclesAndOnBodies) {
+TEST(MatterContact, SlidingFollowsCoulombOnObstaclesAndOnBodies) {
     for (const bool on_body : {false, true})
         for (const double degrees : {26.0, 30.0, 40.0}) {
             Slope slope(degrees, on_body, 0.5);
             const std::size_t body = slope.add(block(4, 4, 4, 0.05, rubber()), 0.1002, 1.2, 1);
-            Simulation sliding = begin(slope.world, slope.actors, GetParam());
+            Simulation sliding = begin(slope.world, slope.actors);
             std::vector<double> way;
             for (int frame = 0; frame < 33; ++frame) {
                 ASSERT_TRUE(sliding.advance(kOneThread).ok());
@@ -156,16 +148,14 @@ TEST(MatterContact, ABlockHoldsOnABodyAndSlidesBeyondItsAngle) {
     }
 }
 
-TEST_P(EachStepMode, BodiesMeetWithoutPassingAndKeepMomentumAndEnergy) {
-    const bool descent = GetParam() == StepMode::descent;
+TEST(MatterContact, BodiesMeetWithoutPassingAndKeepMomentumAndEnergy) {
     const auto cube = block(6, 6, 6, 0.4 / 6, rubber());
     const double wave_speed = pressure_wave_speed(rubber()); // 36.7 m/s
     for (const double speed : {1.0, 5.0, wave_speed / 2}) {
         World world;
         world.gravity.setZero();
-        Simulation meeting = begin(
-            world, {put(cube, {-0.3, 0, 0}, 0, {speed / 2, 0, 0}), put(cube, {0.3, 0.05, 0.03}, 0, {-speed / 2, 0, 0})},
-            GetParam());
+        Simulation meeting = begin(world, {put(cube, {-0.3, 0, 0}, 0, {speed / 2, 0, 0}),
+                                           put(cube, {0.3, 0.05, 0.03}, 0, {-speed / 2, 0, 0})});
         const double energy = meeting.energy(kOneThread).total();
         const Momentum momentum = meeting.momentum();
         double nearest = 1;
@@ -178,14 +168,13 @@ TEST_P(EachStepMode, BodiesMeetWithoutPassingAndKeepMomentumAndEnergy) {
         EXPECT_GT(nearest, 0.2);
         EXPECT_GT(centre_of_mass(meeting, 1).x() - centre_of_mass(meeting, 0).x(), nearest + 0.02) << "they part again";
         const Momentum after = meeting.momentum();
-        EXPECT_LT((after.angular - momentum.angular).norm(), (descent ? 1e-3 : 1e-5) * momentum.angular.norm())
-            << speed;
+        EXPECT_LT((after.angular - momentum.angular).norm(), 1e-5 * momentum.angular.norm()) << speed;
         EXPECT_LT((after.linear - momentum.linear).norm(), 1e-5 * 64 * speed) << speed;
     }
 }
 
 /// The arms are pressed together by a palm on each side.
-Simulation fork_between_palms(MaterialModel model, StepMode mode, bool touches_itself) {
+Simulation fork_between_palms(MaterialModel model, bool touches_itself) {
     World world;
     world.gravity.setZero();
     for (const int side : {-1, 1}) {
@@ -199,13 +188,13 @@ Simulation fork_between_palms(MaterialModel model, StepMode mode, bool touches_i
     matter.model = model;
     const auto body = std::make_shared<Body>(make_body(fork(), matter));
     return Simulation::create(std::move(world), {put(body, Vec3d::Zero())},
-                              {.mode = mode, .contacts_within_bodies = touches_itself}, kOneThread)
+                              {.mode = StepMode::explicit_steps, .contacts_within_bodies = touches_itself}, kOneThread)
         .value();
 }
 
 /// Returns how far one arm's inner face went past the other's, m.
-double press(MaterialModel model, StepMode mode, bool touches_itself, FrameReport& worst) {
-    Simulation pressed = fork_between_palms(model, mode, touches_itself);
+double press(MaterialModel model, bool touches_itself, FrameReport& worst) {
+    Simulation pressed = fork_between_palms(model, touches_itself);
     std::vector<Vec3f> faces;
     for (const float side : {-0.05f, 0.05f})
         for (const float z : {-0.1f, 0.0f, 0.1f}) faces.emplace_back(side, 1.2f, z);
@@ -222,9 +211,8 @@ double press(MaterialModel model, StepMode mode, bool touches_itself, FrameRepor
 
 TEST(MatterContact, ABodyMeetsItself) {
     FrameReport with, without;
-    EXPECT_LT(press(MaterialModel::fem, StepMode::explicit_steps, true, with), 0.03);
-    EXPECT_GT(press(MaterialModel::fem, StepMode::explicit_steps, false, without), 0.06)
-        << "the scene asks nothing of contact";
+    EXPECT_LT(press(MaterialModel::fem, true, with), 0.03);
+    EXPECT_GT(press(MaterialModel::fem, false, without), 0.06) << "the scene asks nothing of contact";
     EXPECT_LT(with.deepest_in_matter, 0.3 * 0.1);
     EXPECT_GT(with.deepest_in_matter, 0);
     EXPECT_EQ(without.deepest_in_matter, 0);
@@ -309,7 +297,7 @@ TEST(MatterContact, AKoalasLegsStayOutOfEachOther) {
         plate.motion.move = {{0, 1.5}, {Vec3d::Zero(), Vec3d(-side * 0.225 * size.x(), 0, 0)}, Vec3d::Zero()};
         plate.friction = 0.5;
     }
-    Simulation pressed = begin(world, {put(body, -scale * box.centre())}, StepMode::automatic);
+    Simulation pressed = begin(world, {put(body, -scale * box.centre())});
     double deepest = 0;
     for (int frame = 0; frame < 120; ++frame)
         deepest = std::max(deepest, pressed.advance(kAllThreads).value().deepest_in_matter);
@@ -329,15 +317,15 @@ TEST(MatterContact, FrictionMayDifferFromPairToPair) {
     EXPECT_GT(centre_of_mass(both, smooth).dot(slope.down), 0.8);
 }
 
-TEST_P(EachStepMode, SavedWhileTouchingItGoesOnTheSameForAnyThreads) {
+TEST(MatterContact, SavedWhileTouchingItGoesOnTheSameForAnyThreads) {
     World world;
     world.obstacles.emplace_back().shape = HalfSpace{};
     const auto cube = block(4, 4, 4, 0.1, rubber(1e5, 0.5));
     const std::vector<Actor> actors = {put(cube, {0, 0.2, 0}), put(cube, {0.1, 0.62, 0.05}, 10),
                                        put(std::make_shared<Body>(make_body(fork(), rubber(5e4))), {0, 0.9, 0})};
-    Simulation one = begin(world, actors, GetParam());
+    Simulation one = begin(world, actors);
     for (int frame = 0; frame < 40; ++frame) ASSERT_TRUE(one.advance(kOneThread).ok());
-    Simulation other = begin(world, actors, GetParam());
+    Simulation other = begin(world, actors);
     ASSERT_TRUE(other.restore(one.save()).ok());
     EXPECT_TRUE(one.save() == other.save());
     const RunContext two_threads(2);
@@ -346,30 +334,6 @@ TEST_P(EachStepMode, SavedWhileTouchingItGoesOnTheSameForAnyThreads) {
         ASSERT_TRUE(other.advance(two_threads).ok());
     }
     EXPECT_TRUE(one.save() == other.save());
-}
-
-// Descent's damping is that of explicit steps: a bar that swings loses as much.
-TEST(MatterContact, DescentHasInternalDamping) {
-    Material material = rubber(1e5);
-    material.internal_damping = 0.01;
-    std::array<double, 2> kept;
-    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
-        World world;
-        world.gravity.setZero();
-        Simulation ringing =
-            Simulation::create(world, {put(block(8, 2, 2, 0.1, material), Vec3d::Zero())},
-                               {.mode = mode, .most_substeps = 4000, .descent_substeps = 100}, kOneThread)
-                .value();
-        Vectors stretched = ringing.positions(0);
-        for (std::size_t i = 0; i < stretched.size(); ++i) stretched.x[i] *= 1.05f;
-        ASSERT_TRUE(ringing.set_positions(0, stretched).ok());
-        const double before = ringing.energy(kOneThread).total();
-        for (int frame = 0; frame < 6; ++frame) ASSERT_TRUE(ringing.advance(kOneThread).ok());
-        kept[mode == StepMode::descent] = ringing.energy(kOneThread).total() / before;
-    }
-    EXPECT_LT(kept[0], 0.6);
-    EXPECT_GT(kept[0], 0.01);
-    EXPECT_NEAR(kept[1] / kept[0], 1, 0.25) << kept[0];
 }
 
 } // namespace

@@ -74,8 +74,7 @@ TEST(MeshfreeElasticity, RateIsABound) {
 
 TEST(MeshfreeElasticity, ComesBackFromBadStarts) {
     const Body body = make_body(box_cells(5, 5, 5, 0.05), meshfree());
-    checks::expect_to_come_back(body, make_meshfree_elasticity, 1 / 60.0);
-    checks::expect_to_come_back(body, make_meshfree_elasticity, 0.1);
+    checks::expect_to_come_back(body, make_meshfree_elasticity, 20);
 }
 
 TEST(MeshfreeElasticity, SameBytesForAnyNumberOfThreads) {

@@ -43,27 +43,25 @@ namespace {
 using namespace simulation_scenes;
 
 TEST(OutOfMemory, AFrameIsWholeOrUndone) {
-    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
-        const auto soft = box(3, 3, 3, 0.1, material(MaterialModel::fem));
-        const auto wax = box(3, 3, 3, 0.1, material(MaterialModel::mpm));
-        Simulation one =
-            simulation(with_ground(), {actor(soft, {0, 0.02, 0}), actor(wax, {1, 0.02, 0})}, {.mode = mode});
-        run(one, 3);
-        const std::string before = one.save();
-        std::size_t failed = 0;
-        bool was_made = false;
-        for (long count = 0; !was_made; count += 1 + count / 16) {
-            allowed = count;
-            try {
-                was_made = one.advance(RunContext(1)).ok();
-            } catch (const std::bad_alloc&) {
-                ++failed;
-            }
-            allowed = -1;
-            ASSERT_TRUE(was_made || one.save() == before) << count;
+    const auto soft = box(3, 3, 3, 0.1, material(MaterialModel::fem));
+    const auto wax = box(3, 3, 3, 0.1, material(MaterialModel::mpm));
+    Simulation one = simulation(with_ground(), {actor(soft, {0, 0.02, 0}), actor(wax, {1, 0.02, 0})},
+                                {.mode = StepMode::explicit_steps});
+    run(one, 3);
+    const std::string before = one.save();
+    std::size_t failed = 0;
+    bool was_made = false;
+    for (long count = 0; !was_made; count += 1 + count / 16) {
+        allowed = count;
+        try {
+            was_made = one.advance(RunContext(1)).ok();
+        } catch (const std::bad_alloc&) {
+            ++failed;
         }
-        EXPECT_GT(failed, 20U);
+        allowed = -1;
+        ASSERT_TRUE(was_made || one.save() == before) << count;
     }
+    EXPECT_GT(failed, 20U);
 }
 
 } // namespace

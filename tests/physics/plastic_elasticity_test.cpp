@@ -145,33 +145,32 @@ TEST(PlasticElasticity, AFreeBodyKeepsItsMomentumAndStaysLonger) {
     material.damping = 0;
     World world;
     world.gravity = Vec3d::Zero();
-    for (const StepMode mode : {StepMode::explicit_steps, StepMode::descent}) {
-        const auto body = block(6, 4, 4, 0.1, material);
-        Simulation simulation =
-            Simulation::create(world, {{.body = body}},
-                               {.frames_per_second = 100, .mode = mode, .contacts_within_bodies = false}, kTwoThreads)
-                .value();
-        Vectors velocities(body->rest.size());
-        for (std::size_t i = 0; i < velocities.size(); ++i) {
-            const Vec3f& p = body->rest[i];
-            velocities.set(i, {10 * p.x() + 1, -2 * p.x() * p.y() + 0.3f, -p.z()});
-        }
-        ASSERT_TRUE(simulation.set_velocities(0, velocities).ok());
-        const Momentum before = simulation.momentum();
-        const double start = simulation.energy(kTwoThreads).total();
-        for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
-        const Momentum after = simulation.momentum();
-        const double size = before.linear.norm(), exact = mode == StepMode::descent ? 1e-4 : 1e-6;
-        EXPECT_LT((after.linear - before.linear).norm(), exact * size);
-        EXPECT_LT((after.angular - before.angular).norm(), 20 * exact * size * 0.6);
-        EXPECT_LT(simulation.energy(kTwoThreads).total(), start);
-        // Longer than it was, for good: what is elastic is a hundredth. The block does not turn.
-        const auto length = [](const Vectors& x) {
-            const auto [least, most] = std::minmax_element(x.x.begin(), x.x.begin() + std::ptrdiff_t(x.size()));
-            return *most - *least;
-        };
-        EXPECT_GT(length(simulation.positions(0)), (mode == StepMode::descent ? 1.04f : 1.08f) * length(body->rest));
+    const auto body = block(6, 4, 4, 0.1, material);
+    Simulation simulation =
+        Simulation::create(
+            world, {{.body = body}},
+            {.frames_per_second = 100, .mode = StepMode::explicit_steps, .contacts_within_bodies = false}, kTwoThreads)
+            .value();
+    Vectors velocities(body->rest.size());
+    for (std::size_t i = 0; i < velocities.size(); ++i) {
+        const Vec3f& p = body->rest[i];
+        velocities.set(i, {10 * p.x() + 1, -2 * p.x() * p.y() + 0.3f, -p.z()});
     }
+    ASSERT_TRUE(simulation.set_velocities(0, velocities).ok());
+    const Momentum before = simulation.momentum();
+    const double start = simulation.energy(kTwoThreads).total();
+    for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
+    const Momentum after = simulation.momentum();
+    const double size = before.linear.norm(), exact = 1e-6;
+    EXPECT_LT((after.linear - before.linear).norm(), exact * size);
+    EXPECT_LT((after.angular - before.angular).norm(), 20 * exact * size * 0.6);
+    EXPECT_LT(simulation.energy(kTwoThreads).total(), start);
+    // Longer than it was, for good: what is elastic is a hundredth. The block does not turn.
+    const auto length = [](const Vectors& x) {
+        const auto [least, most] = std::minmax_element(x.x.begin(), x.x.begin() + std::ptrdiff_t(x.size()));
+        return *most - *least;
+    };
+    EXPECT_GT(length(simulation.positions(0)), 1.08f * length(body->rest));
 }
 
 TEST(PlasticElasticity, SavedAndRestored) {

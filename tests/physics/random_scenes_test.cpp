@@ -38,7 +38,6 @@ Scene random_scene(std::uint64_t seed) {
     scene.world.body_friction = dice.between(0, 1);
     scene.world.body_restitution = dice.between(0, 0.9);
     if (dice.below(2)) scene.world.obstacles.emplace_back().shape = Ball{{dice.between(-0.5, 0.5), 0, 0}, 0.4};
-    if (dice.below(3) == 0) scene.options.mode = StepMode::descent;
     const std::size_t bodies = 2 + dice.below(4);
     for (std::size_t b = 0; b < bodies; ++b) {
         Material material;

@@ -2,6 +2,7 @@
 
 #include "filigree/scene/scene_keys.h"
 
+#include <cmath>
 #include <numbers>
 
 namespace filigree {
@@ -56,8 +57,92 @@ TEST_F(SceneFileTest, WhatCannotBreakIsToldWhatToWrite) {
                                      "[[fracture]]\npieces = 25\n");
     EXPECT_NE(said.find("'statue'"), std::string::npos) << said;
     EXPECT_NE(said.find("add model = \"fem\" and young_modulus = "), std::string::npos) << said;
+    EXPECT_NE(said.find("brittle-stone, glass, plaster"), std::string::npos) << said;
     EXPECT_TRUE(read_scene(write("[[body]]\nname = \"statue\"\nshape = \"bar\"\nmaterial = \"stone\"\n"
                                  "model = \"fem\"\nyoung_modulus = 2e7\n[[fracture]]\npieces = 25\n")));
+}
+
+TEST_F(SceneFileTest, WhatBreaksKnowsItsStrength) {
+    const auto fracture_of = [&](const std::string& more, const std::string& said = "") {
+        return scene("[[body]]\nshape = \"bar\"\nmaterial = \"brittle-stone\"\n" + more + "[[fracture]]\n" + said)
+            .fractures[0];
+    };
+    EXPECT_EQ(fracture_of("").material.strength, 1e5);
+    EXPECT_EQ(fracture_of("").energy, 20);
+    EXPECT_NEAR(fracture_of("young_modulus = 4e7\n").material.strength, 2e5, 1e-6) << "at the same strain";
+    EXPECT_EQ(fracture_of("", "strength = 7\nenergy = 3\n").material.strength, 7);
+    EXPECT_EQ(fracture_of("", "strength = 7\nenergy = 3\n").energy, 3);
+}
+
+TEST_F(SceneFileTest, ARepeatedBodyIsMany) {
+    const std::string stone = "[[body]]\nname = \"stone\"\nshape = \"wavy-cube\"\ncentre = [1, 2, 3]\n";
+    const SceneFile plain =
+        scene(stone + "repeat = { count = [5, 2, 1], step = [1, 10, 100] }\n[[body]]\nshape = \"bar\"\n");
+    ASSERT_EQ(plain.bodies.size(), 11U);
+    EXPECT_EQ(plain.bodies[0].name, "stone.1");
+    EXPECT_EQ(plain.bodies[9].name, "stone.10");
+    EXPECT_EQ(plain.bodies[9].group, "stone");
+    EXPECT_EQ(plain.bodies[10].name, "bar");
+    EXPECT_EQ(plain.bodies[0].aside, Vec3d::Zero());
+    EXPECT_EQ(plain.bodies[9].aside, Vec3d(4, 10, 0));
+    const SceneFile row = scene(stone + "repeat = { count = 3, step = [1, 10, 100] }\n");
+    ASSERT_EQ(row.bodies.size(), 3U);
+    EXPECT_EQ(row.bodies[2].aside, Vec3d(2, 20, 200));
+    // Jitter and turns are bounded, differ, and are the same in every run.
+    const std::string shaken = "repeat = { count = 40, jitter = 0.1, turn = 30";
+    const SceneFile first = scene(stone + shaken + " }\n"), again = scene(stone + shaken + " }\n"),
+                    other = scene(stone + shaken + ", seed = 2 }\n");
+    double most = 0, turned = 0;
+    for (std::size_t b = 0; b < 40; ++b) {
+        EXPECT_EQ(first.bodies[b].aside, again.bodies[b].aside);
+        EXPECT_NE(first.bodies[b].aside, other.bodies[b].aside);
+        most = std::max(most, first.bodies[b].aside.cwiseAbs().maxCoeff());
+        turned = std::max(turned, std::abs(first.bodies[b].rotation.angle()));
+    }
+    EXPECT_LE(most, 0.1);
+    EXPECT_GT(most, 0.08);
+    EXPECT_LE(turned, 30 * std::numbers::pi / 180 + 1e-12);
+    EXPECT_GT(turned, 20 * std::numbers::pi / 180);
+}
+
+TEST_F(SceneFileTest, RepeatedBodiesAreNamedOneOrAll) {
+    const std::string stones = "[[body]]\nname = \"stone\"\nshape = \"wavy-cube\"\nrepeat = { count = 12 }\n";
+    const std::string bar = "[[body]]\nname = \"bar\"\nshape = \"bar\"\n";
+    const auto pair = [&](const std::string& first) {
+        return scene(stones + bar + "[[pair]]\nfirst = \"" + first + "\"\nsecond = \"bar\"\nfriction = 1\n")
+            .pairs[0]
+            .first;
+    };
+    EXPECT_EQ(pair("stone").size(), 12U);
+    EXPECT_EQ(pair("stone.3"), std::vector<std::size_t>{2});
+    EXPECT_EQ(pair("stone.1*"), (std::vector<std::size_t>{0, 9, 10, 11}));
+    EXPECT_EQ(pair("*").size(), 13U);
+    EXPECT_EQ(pair("rubber").size(), 13U) << "the material";
+    EXPECT_EQ(scene(stones + bar + "[[force]]\nbody = \"stone\"\n").forces.size(), 12U);
+    EXPECT_EQ(scene(stones + bar + "[[force]]\nbody = \"stone.2\"\n").forces[0].body, 1U);
+    EXPECT_EQ(scene(stones + "[[pin]]\n").pins.size(), 12U) << "the only one";
+    EXPECT_EQ(scene(stones + bar + "[[fracture]]\nbody = \"stone\"\n").fractures.size(), 12U);
+    const std::string hand = "[[hand]]\nvertex = 0\ntarget = [0, 0, 0]\nbody = ";
+    EXPECT_EQ(scene(stones + bar + hand + "\"stone.12\"\n").hands[0].body, 11U);
+    EXPECT_NE(
+        refusal(stones + bar + hand + "\"stone\"\n").find("'stone' is repeated; name one of them, such as 'stone.1'"),
+        std::string::npos);
+    EXPECT_NE(refusal(stones + bar + hand + "\"stune\"\n").find("there are stone, bar."), std::string::npos);
+    EXPECT_NE(refusal(stones + stones).find("two bodies are called 'stone'"), std::string::npos);
+}
+
+TEST_F(SceneFileTest, WrongRepeatsAreRefused) {
+    const auto said = [&](const std::string& repeat) {
+        return refusal("[[body]]\nshape = \"bar\"\nrepeat = " + repeat + "\n");
+    };
+    EXPECT_NE(said("3").find("3: 'repeat' in [[body]] must be a table such as { count = "), std::string::npos)
+        << said("3");
+    EXPECT_NE(said("{ step = [1, 0, 0] }").find("a table such as"), std::string::npos);
+    EXPECT_NE(said("{ count = 0 }").find("repeat.count"), std::string::npos);
+    EXPECT_NE(said("{ count = [1, 2] }").find("one whole number or three"), std::string::npos);
+    EXPECT_NE(said("{ count = [100, 100, 2] }").find("these are 20000 bodies"), std::string::npos);
+    EXPECT_NE(said("{ count = 2, jitter = -1 }").find("repeat.jitter"), std::string::npos);
+    EXPECT_NE(said("{ count = 2, stp = [1, 0, 0] }").find("did you mean 'step'?"), std::string::npos);
 }
 
 TEST_F(SceneFileTest, ValuesTakeThePlaceOfWhatIsWritten) {

@@ -66,11 +66,13 @@ Material make_material(const std::string& name, const py::kwargs& changes) {
 }
 
 PyBody make_one(const py::object& given, const py::object& material, std::optional<std::size_t> particles,
-                std::optional<double> spacing, double scale, unsigned threads, const py::object& progress) {
+                std::optional<double> spacing, double scale, std::optional<double> size, unsigned threads,
+                const py::object& progress) {
     const MeshPtr mesh = mesh_of(given);
     const Material of = material_of(material);
     BodyOptions options;
     options.scale = scale;
+    options.size = size;
     if (particles && spacing) refuse("Give particles or spacing, not both.");
     options.cells.count = particles.value_or(options.cells.count);
     if (spacing && !(*spacing > 0)) refuse("spacing has to be above 0.");
@@ -92,6 +94,7 @@ py::dict body_report(const PyBody& self) {
     said["thin_cells"] = report.cells.thin_cells;
     said["loose_parts"] = report.cells.loose_parts;
     said["volume"] = report.cells.volume;
+    said["joined_corners"] = report.joined.corners;
     said["surface_points"] = report.surface_points;
     said["mass"] = report.mass;
     said["warning"] = report.warning;
@@ -177,6 +180,8 @@ spacing : float, optional
     Between them, m; in place of `particles`.
 scale : float
     Metres a model unit, above 0.
+size : float, optional
+    m, above 0: the longest side of the mesh's box; in place of `scale`.
 
 Raises
 ------
@@ -185,7 +190,7 @@ UsageError, UnsuitableError, Cancelled
 Warns
 -----
 FiligreeWarning
-    Parts thinner than two cells, or left out.
+    Parts thinner than two cells, or so near each other that they are joined.
 
 Examples
 --------
@@ -196,8 +201,8 @@ Examples
         .def(
             py::init(&make_one), py::arg("mesh"), py::arg("material") = "rubber", py::kw_only(),
             py::arg("particles") = py::none(), py::arg("spacing") = py::none(), py::arg("scale") = 1.0,
-            py::arg("threads") = 0, py::arg("progress") = py::none(),
-            R"(__init__(self, mesh, material='rubber', *, particles=None, spacing=None, scale=1.0, threads=0, progress=None)
+            py::arg("size") = py::none(), py::arg("threads") = 0, py::arg("progress") = py::none(),
+            R"(__init__(self, mesh, material='rubber', *, particles=None, spacing=None, scale=1.0, size=None, threads=0, progress=None)
 --
 
 )")

@@ -39,11 +39,20 @@ std::unique_ptr<PyScene> make_scene(const std::filesystem::path& path, bool chec
     return scene;
 }
 
+/// Warns when the run becomes one that is not to be trusted.
 void advance(PyScene& self, std::uint64_t frame, const py::object& progress) {
+    std::vector<std::string> sentences;
     LongCall{self.threads, progress}([&](const RunContext& context) {
         const std::lock_guard lock(self.mutex);
-        return self.run->advance_to(frame, context).value();
+        const bool was_sound = !self.run->broke_down();
+        self.run->advance_to(frame, context).value();
+        if (const std::optional<std::string> why = self.run->broke_down(); why && was_sound) {
+            sentences = self.run->warnings();
+            sentences.push_back(*why);
+        }
+        return Success{};
     });
+    warn(sentences);
 }
 
 /// Frames before the one asked for are made as well, as what dies stays dead: once, where frames are asked for in
@@ -90,7 +99,7 @@ UsageError, UnsuitableError, Cancelled
 Warns
 -----
 FiligreeWarning
-    What is hard to simulate.
+    What is hard to simulate; in `step` and `advance_to`, a motion that is not to be trusted (see `doubt`).
 )")
         .def(py::init(&make_scene), py::arg("path"), py::kw_only(), py::arg("checks") = false, py::arg("threads") = 0,
              py::arg("progress") = py::none(),
@@ -135,6 +144,15 @@ Simulate until so many frames are done. What was recorded before an error or Ctr
                 });
             },
             "What makes the motion so far doubtful, a list of sentences.")
+        .def_property_readonly(
+            "doubt",
+            [](PyScene& self) {
+                return without_interpreter([&] {
+                    const std::lock_guard lock(self.mutex);
+                    return self.run->broke_down();
+                });
+            },
+            "None, or why the motion so far is not to be trusted: a sentence. `warnings` say where and what to change.")
         .def(
             "model",
             [](const py::object& self, std::size_t body) {

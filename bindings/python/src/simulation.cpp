@@ -1,6 +1,10 @@
 #include "models.h"
 #include "world.h"
 
+#include <filigree/physics/grid_limits.h>
+#include <filigree/physics/own_weight.h>
+
+#include <cstdio>
 #include <mutex>
 
 namespace filigree::python {
@@ -59,9 +63,8 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
                               const py::object& wind, double air_density, const py::object& air_temperature,
                               double air_heat_transfer, const std::vector<HeatSource>& heat_sources, double friction,
                               double restitution, double frames_per_second, const std::string& mode,
-                              unsigned most_substeps, unsigned descent_substeps, unsigned descent_iterations,
-                              bool contacts_between_bodies, bool contacts_within_bodies, bool automatic_rigid,
-                              unsigned threads) {
+                              unsigned most_substeps, bool contacts_between_bodies, bool contacts_within_bodies,
+                              bool automatic_rigid, unsigned threads) {
     std::vector<PyBody> held;
     std::vector<Actor> actors;
     for (const py::handle given : py::list(bodies)) {
@@ -91,24 +94,37 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
     options.frames_per_second = frames_per_second;
     options.mode = value_of<StepMode>(
         mode, "mode",
-        {{"auto", StepMode::automatic}, {"explicit", StepMode::explicit_steps}, {"descent", StepMode::descent}});
+        {{"auto", StepMode::automatic}, {"explicit", StepMode::explicit_steps}, {"descent", StepMode::automatic}});
+    if (mode == "descent" &&
+        PyErr_WarnEx(PyExc_DeprecationWarning, "mode='descent' is gone: 'auto' takes its place.", 1))
+        throw py::error_already_set();
     options.most_substeps = most_substeps;
-    options.descent_substeps = descent_substeps;
-    options.descent_iterations = descent_iterations;
     options.contacts_between_bodies = contacts_between_bodies;
     options.contacts_within_bodies = contacts_within_bodies;
     options.automatic_rigid = automatic_rigid;
+    std::vector<std::string> sentences;
+    for (std::size_t b = 0; b < actors.size(); ++b)
+        if (const std::string weight =
+                weight_warning(*actors[b].body, actors[b].placement.linear(), world.gravity, "such soft matter");
+            !weight.empty())
+            sentences.push_back("Body " + std::to_string(b) + " " + weight);
+    if (const std::string sentence = why_models_do_not_meet(actors); !sentence.empty())
+        sentences.push_back(sentence + ".");
+    for (const SlenderObstacle& slender : find_slender_obstacles(world, actors))
+        sentences.push_back(slender.sentence("obstacle " + std::to_string(slender.obstacle)) + ".");
     Simulation made = LongCall{threads}([&](const RunContext& context) {
         return Simulation::create(std::move(world), std::move(actors), options, context).value();
     });
+    for (const StartOverlap& overlap : made.start_overlaps())
+        sentences.push_back(
+            overlap.sentence("body " + std::to_string(overlap.body), "obstacle " + std::to_string(overlap.obstacle)) +
+            ".");
+    warn(sentences);
     return SimulationPtr(new PySimulation{std::move(held), std::move(made), threads});
 }
 
 py::dict said_of(const FrameReport& report) {
-    constexpr const char* causes[] = {"", "chosen", "too_many_substeps", "not_finite"};
     py::dict said, seconds;
-    said["used"] = report.used == StepMode::descent ? "descent" : "explicit";
-    said["why_descent"] = causes[static_cast<std::size_t>(report.why_descent)];
     said["substeps"] = report.substeps;
     said["contacts"] = report.contacts;
     said["deepest_contact"] = report.deepest_contact;
@@ -117,6 +133,8 @@ py::dict said_of(const FrameReport& report) {
     said["flowed_out"] = report.flowed_out;
     said["most_stretch"] = report.most_stretch;
     said["clamped_particles"] = report.clamped_particles;
+    said["clamped_body"] = report.clamped_body;
+    said["clamped_at"] = array_of(report.clamped_at.cast<double>());
     seconds["elastic"] = report.elastic_seconds;
     seconds["contact"] = report.contact_seconds;
     seconds["other"] = report.other_seconds;
@@ -124,14 +142,52 @@ py::dict said_of(const FrameReport& report) {
     return said;
 }
 
+std::string text_of(const Vec3f& place) {
+    char text[96];
+    std::snprintf(text, sizeof text, "(%.3g, %.3g, %.3g) m", double(place.x()), double(place.y()), double(place.z()));
+    return text;
+}
+
+/// A sentence where a frame came out wrong, or "".
+std::string doubt_of(const Simulation& simulation, const FrameReport& report) {
+    const std::string frame = "Frame " + std::to_string(simulation.frame()) + ": ";
+    const std::string mend = "; make it smaller, stiffer (young_modulus) or slower.";
+    if (report.clamped_particles > 0)
+        return frame + std::to_string(report.clamped_particles) +
+               " motions of particles were not finite or had to be limited, the first of body " +
+               std::to_string(report.clamped_body) + " near " + text_of(report.clamped_at) + mend;
+    if (report.least_volume_ratio > 0) return "";
+    for (std::size_t b = 0; b < simulation.body_count(); ++b)
+        if (const InvertedCells cells = simulation.inverted(b); cells.count > 0)
+            return frame + std::to_string(cells.count) + " cells of body " + std::to_string(b) +
+                   " are inside out, the worst near " + text_of(cells.place) + mend;
+    return "";
+}
+
 py::dict step(PySimulation& self, unsigned frames) {
     if (frames == 0) refuse("frames has to be 1 or more.");
-    return said_of(LongCall{self.threads}([&](const RunContext& context) {
+    std::string doubt;
+    const py::dict said = said_of(LongCall{self.threads}([&](const RunContext& context) {
         const std::lock_guard lock(self.mutex);
         FrameReport report;
-        for (unsigned k = 0; k < frames; ++k) report = self.simulation.advance(context).value();
+        for (unsigned k = 0; k < frames; ++k) {
+            report = self.simulation.advance(context).value();
+            if (doubt.empty()) doubt = doubt_of(self.simulation, report);
+        }
         return report;
     }));
+    if (!doubt.empty()) warn({doubt});
+    return said;
+}
+
+py::dict inverted(PySimulation& self, std::size_t body) {
+    self.checked(body);
+    const InvertedCells cells = self.alone([&] { return self.simulation.inverted(body); });
+    py::dict said;
+    said["count"] = cells.count;
+    said["least"] = cells.least;
+    said["place"] = array_of(cells.place.cast<double>());
+    return said;
 }
 
 Attachment attach(const SimulationPtr& self, std::size_t body, const py::object& what) {
@@ -200,8 +256,8 @@ friction, restitution : float
     Where bodies touch each other.
 frames_per_second : float
 mode : str
-    'auto', 'explicit' or 'descent' (docs/bodies.md); `most_substeps`, `descent_substeps` and `descent_iterations` belong
-    to it.
+    'auto': bodies that would need more than `most_substeps` a frame become rigid. 'explicit': they stay elastic,
+    whatever they cost.
 contacts_between_bodies, contacts_within_bodies : bool
 automatic_rigid : bool
     Bodies too small or stiff to be stepped as elastic become rigid.
@@ -211,10 +267,15 @@ Raises
 UsageError
     With the place of the first thing that is wrong.
 
+Warns
+-----
+FiligreeWarning
+    A body that its own weight would flatten.
+
 Examples
 --------
 >>> model = filigree.strip(filigree.make("wavy-cube", resolution=16))
->>> body = filigree.Body(model.mesh, "jelly", particles=500)
+>>> body = filigree.Body(model.mesh, "jelly", particles=500, size=0.2)
 >>> floor = filigree.Obstacle.plane((0, -1, 0))
 >>> simulation = filigree.Simulation([body], obstacles=[floor])
 >>> driver = simulation.attach(0, model)
@@ -230,10 +291,9 @@ Examples
             py::arg("wind") = py::make_tuple(0, 0, 0), py::arg("air_density") = 0.0, py::arg("air_temperature") = 293.0,
             py::arg("air_heat_transfer") = 0.0, py::arg("heat_sources") = py::tuple(), py::arg("friction") = 0.3,
             py::arg("restitution") = 0.7, py::arg("frames_per_second") = 60.0, py::arg("mode") = "auto",
-            py::arg("most_substeps") = 256, py::arg("descent_substeps") = 4, py::arg("descent_iterations") = 8,
-            py::arg("contacts_between_bodies") = true, py::arg("contacts_within_bodies") = true,
-            py::arg("automatic_rigid") = true, py::arg("threads") = 0,
-            R"(__init__(self, bodies, *, gravity=(0, -9.81, 0), obstacles=(), pins=(), forces=(), hands=(), wind=(0, 0, 0), air_density=0.0, air_temperature=293.0, air_heat_transfer=0.0, heat_sources=(), friction=0.3, restitution=0.7, frames_per_second=60.0, mode='auto', most_substeps=256, descent_substeps=4, descent_iterations=8, contacts_between_bodies=True, contacts_within_bodies=True, automatic_rigid=True, threads=0)
+            py::arg("most_substeps") = 500, py::arg("contacts_between_bodies") = true,
+            py::arg("contacts_within_bodies") = true, py::arg("automatic_rigid") = true, py::arg("threads") = 0,
+            R"(__init__(self, bodies, *, gravity=(0, -9.81, 0), obstacles=(), pins=(), forces=(), hands=(), wind=(0, 0, 0), air_density=0.0, air_temperature=293.0, air_heat_transfer=0.0, heat_sources=(), friction=0.3, restitution=0.7, frames_per_second=60.0, mode='auto', most_substeps=500, contacts_between_bodies=True, contacts_within_bodies=True, automatic_rigid=True, threads=0)
 --
 
 )")
@@ -245,7 +305,22 @@ So many frames. When Ctrl-C comes, the frame that was begun is undone.
 Returns
 -------
 dict
-    Of the last frame: 'used' ('explicit' or 'descent'), 'substeps', 'contacts', 'least_volume_ratio' and more.
+    Of the last frame: 'substeps', 'contacts', 'deepest_contact', 'least_volume_ratio' and more.
+
+Warns
+-----
+FiligreeWarning
+    Of any of the frames: a motion was not finite or had to be limited, or cells were inside out at the end.
+)")
+        .def("inverted", &inverted, py::arg("body"), R"(inverted(self, body)
+--
+
+Cells of a body of 'fem' or 'springs' that are inside out now.
+
+Returns
+-------
+dict
+    'count', 'least' (the smallest volume of a cell, as a part of that at rest) and 'place' (of that cell, m, float64 (3,)).
 )")
         .def_property_readonly(
             "frame", [](PySimulation& self) { return self.alone([&] { return self.simulation.frame(); }); },
@@ -332,7 +407,7 @@ newtons : array_like, (p, 3), or None
 Raises
 ------
 UsageError
-    No such body, one of 'mpm', another number of particles, numbers that are not finite.
+    No such body, another number of particles, numbers that are not finite.
 )")
         .def(
             "set_hands",

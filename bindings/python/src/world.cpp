@@ -173,13 +173,13 @@ A box along the axes before its motion; m. The others as of `plane`.
            const py::object& progress) {
             const MeshPtr mesh = mesh_of(given);
             OutwardReport outward;
-            auto field = LongCall{threads, progress}([&](const RunContext& context) {
-                return std::make_shared<const DistanceField>(
-                    DistanceField::create(*mesh, scale, spacing, context, &outward).value());
+            MeshObstacle shape = LongCall{threads, progress}([&](const RunContext& context) {
+                return make_mesh_obstacle(*mesh, scale, spacing, context, &outward).value();
             });
             warn_of_turns(outward);
-            return make_obstacle(MeshObstacle{std::move(field), scale * mesh->origin}, motion, friction, restitution,
-                                 stiffness, temperature, heat_transfer);
+            shape.offset = scale * mesh->origin;
+            return make_obstacle(std::move(shape), motion, friction, restitution, stiffness, temperature,
+                                 heat_transfer);
         },
         py::arg("mesh"), py::arg("scale") = 1.0, py::kw_only(), py::arg("spacing") = 0.0,
         py::arg("motion") = RigidMotion{}, py::arg("friction") = 0.5, py::arg("restitution") = 0.5,
@@ -188,8 +188,9 @@ A box along the axes before its motion; m. The others as of `plane`.
         R"(mesh(mesh, scale=1.0, *, spacing=0.0, motion=..., friction=0.5, restitution=0.5, stiffness=1.0, temperature=293.0, heat_transfer=0.0, threads=0, progress=None)
 --
 
-A mesh, `scale` metres a model unit, as a field of distances with this `spacing` (m; 0: a 64th of the longest side).
-Warns where faces look inwards and count as turned: a room whose faces look inwards is a solid block.
+A mesh, `scale` metres a model unit. Its faces are walls with two sides: open sheets, terrain, rooms and thin plates stop
+what comes from either side. What starts inside of a closed mesh stays in it, as in a room. `spacing`: of the grid of
+distances beside it, m (0: a 64th of the longest side). Warns where faces count as turned on that grid.
 )");
 
     py::class_<Pin>(m, "Pin", R"(Particles held fast.

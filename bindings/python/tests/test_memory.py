@@ -18,7 +18,7 @@ def test_nothing_leaks(tmp_path):
     rest = model.driver.vertices
     bend = filigree.bend(mesh, "x", 30)
     body = filigree.Body(mesh, "jelly", particles=30)
-    simulation = filigree.Simulation([body], mode="descent", descent_substeps=1, descent_iterations=1)
+    simulation = filigree.Simulation([body], mode="explicit")
     driver = simulation.attach(0, model)
     solver = filigree.HandleSolver(mesh, [0, 1])
     inside = filigree.InsideTest(mesh)

@@ -1,6 +1,7 @@
 """Bodies step by step: forces of one's own, pins, hands, saved states."""
 
 import concurrent.futures
+import warnings
 
 import numpy
 import pytest
@@ -247,3 +248,82 @@ def test_air_and_heat_sources_change_while_it_runs():
             simulation.set_air(wrong, 1)
     with pytest.raises(filigree.UsageError, match=r"heat_sources\[0\]"):
         simulation.set_heat_sources([filigree.HeatSource((0, 0, 0), -1, 1)])
+
+
+def test_forces_hands_and_warnings_of_mpm():
+    wax = filigree.Body(BAR, filigree.Material("wax", temperature=290), particles=300)
+    simulation = filigree.Simulation([wax], gravity=(0, 0, 0))
+    simulation.set_forces(0, wax.mass[:, None] * [0, 3.0, 0])
+    simulation.step(10)
+    assert simulation.momentum()[0][1] == pytest.approx(wax.mass.sum() * 0.5, rel=0.05)
+    simulation.set_forces(0, None)
+    simulation.set_hands([filigree.Hand(0, (2, 0, 0), (2, -1, 0))])
+    simulation.step(10)
+    assert simulation.momentum()[0][1] < wax.mass.sum() * 0.5
+    with pytest.warns(filigree.FiligreeWarning, match="pass through bodies of other models"):
+        filigree.Simulation([wax, filigree.Body(BAR, "jelly", spacing=0.25)])
+    with pytest.warns(filigree.FiligreeWarning, match="obstacle 0 is 0.002 m wide"):
+        filigree.Simulation([wax], obstacles=[filigree.Obstacle.box((0, -2, 0), (0.002, 0.002, 4))])
+
+
+def said_by(work):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        result = work()
+    return result, [str(warning.message) for warning in caught if issubclass(warning.category, filigree.FiligreeWarning)]
+
+
+def test_a_body_has_a_size_or_a_scale():
+    body = filigree.Body(BAR, "rubber", size=0.8, particles=100)
+    assert body.scale == pytest.approx(0.8 / 4)
+    with pytest.raises(filigree.UsageError, match="scale or size, not both"):
+        filigree.Body(BAR, size=1, scale=2)
+    for size in (0, -1, float("nan")):
+        with pytest.raises(filigree.UsageError, match="above 0"):
+            filigree.Body(BAR, size=size)
+
+
+def test_a_body_that_cannot_carry_itself_is_told():
+    large, small = (filigree.Body(BAR, "jelly", particles=100, size=size) for size in (20, 0.4))
+    assert said_by(lambda: filigree.Simulation([small]))[1] == []
+    (sentence,) = said_by(lambda: filigree.Simulation([small, large]))[1]
+    assert sentence.startswith("Body 1 is 5 m high and weighs") and "cannot carry itself: scale = " in sentence
+    assert said_by(lambda: filigree.Simulation([large], gravity=(0, 0, 0)))[1] == []
+
+
+def test_parts_that_are_joined_are_told():
+    vertices, faces = [], []
+    for low, high in (((0, 0, 0), (2, 0.2, 0.2)), ((0, 0.23, 0), (2, 0.43, 0.2)), ((-0.3, 0, 0), (0.05, 0.43, 0.2))):
+        corners = numpy.array([[(low, high)[i >> axis & 1][axis] for axis in range(3)] for i in range(8)])
+        quads = [(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)]
+        faces += [tuple(corner + len(vertices) for corner in quad) for quad in quads]
+        vertices += corners.tolist()
+    fork = filigree.Mesh(vertices, faces)
+    body, said = said_by(lambda: filigree.Body(fork, "jelly", spacing=0.05))
+    assert "move as one" in said[0] and body.report["joined_corners"] > 40
+    assert said_by(lambda: filigree.Body(fork, "jelly", spacing=0.014))[1] == []
+
+
+def test_frames_that_went_wrong_are_told(body):
+    simulation = filigree.Simulation([body], gravity=(0, 0, 0))
+    assert said_by(lambda: simulation.step(3))[1] == []
+    assert simulation.inverted(0)["count"] == 0 and simulation.inverted(0)["least"] == pytest.approx(1, abs=0.01)
+    simulation.set_positions(0, simulation.positions(0) * [-1, 1, 1])
+    assert simulation.inverted(0)["count"] == body.report["cells"]
+    assert simulation.inverted(0)["least"] == pytest.approx(-1, abs=0.01)
+    _, said = said_by(simulation.step)
+    assert any("are inside out, the worst near (" in sentence or "had to be limited" in sentence for sentence in said)
+
+
+def test_a_scene_that_went_wrong_is_told(tmp_path):
+    path = tmp_path / "sunk.toml"
+    path.write_text(
+        '[[body]]\nname = "cube"\nshape = "wavy-cube"\nresolution = 8\nparticles = 200\ndriver = 60\n'
+        '[[obstacle]]\nshape = "ground"\n'
+    )
+    run, said = said_by(lambda: filigree.SceneRun(path))
+    assert said == [] and run.doubt is None
+    _, said = said_by(lambda: run.step(4))
+    assert said[-1] == run.doubt and "energy came from nowhere" in run.doubt
+    assert "frame 1 " in said[0] and "'cube'" in said[0]
+    assert said_by(lambda: run.step(2))[1] == [], "once"

@@ -259,6 +259,32 @@ struct ClosestPointTree::Tree {
         const SurfacePoint found = surface_point(closest_on_triangle(query, corners(search.triangle)), search.triangle);
         return found.distance <= max_distance ? found : SurfacePoint{};
     }
+
+    struct Listing {
+        const Tree& tree;
+        const void* of;
+        void (*visit)(const void*, Index);
+    };
+    static bool list(RTCPointQueryFunctionArguments* args) {
+        const Listing& listing = *static_cast<const Listing*>(args->userPtr);
+        const Leaf leaf = listing.tree.leaf(args->primID);
+        for (Index i = 0; i < leaf.count; ++i) listing.visit(listing.of, leaf.first + i);
+        return false; // the radius stays
+    }
+    void visit_near(const Vec3d& at, double radius, Listing listing) const {
+        const Vec3d local = to_local(at);
+        const double reach = local.cwiseAbs().maxCoeff();
+        const double wide = radius * scale * (1 + kRadiusSlack) + kRadiusSlack * (1 + reach);
+        if (!(reach <= 1 + wide)) return; // it is that far from the box of all
+        RTCPointQuery point{};
+        point.x = static_cast<float>(local.x());
+        point.y = static_cast<float>(local.y());
+        point.z = static_cast<float>(local.z());
+        point.radius = static_cast<float>(std::min(wide, 10 * kFarthest));
+        RTCPointQueryContext context;
+        rtcInitPointQueryContext(&context);
+        rtcPointQuery(scene, &point, &context, list, &listing);
+    }
 };
 
 ClosestPointTree::ClosestPointTree(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
@@ -271,6 +297,12 @@ ClosestPointTree& ClosestPointTree::operator=(ClosestPointTree&&) noexcept = def
 SurfacePoint ClosestPointTree::closest(const Vec3f& query, double max_distance, const Vec3f& facing) const {
     if (!tree_->scene || !(max_distance >= 0)) return {};
     return tree_->closest(query.cast<double>(), max_distance, facing.cast<double>());
+}
+
+void ClosestPointTree::visit_near(const Vec3f& point, double radius, const void* of,
+                                  void (*visit)(const void*, Index)) const {
+    if (tree_->scene && radius >= 0 && point.allFinite())
+        tree_->visit_near(point.cast<double>(), radius, {*tree_, of, visit});
 }
 
 } // namespace filigree

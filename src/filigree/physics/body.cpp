@@ -3,8 +3,11 @@
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/body/cell_shares.h"
+#include "filigree/physics/body/joined_parts.h"
 #include "filigree/physics/body/mesh_cells.h"
+#include "filigree/physics/body/occupied_cells.h"
 #include "filigree/physics/body/surface_points.h"
+#include "filigree/physics/simulation.h"
 
 #include <algorithm>
 #include <cassert>
@@ -217,19 +220,36 @@ Status add_field(Body& body, const Mesh& mesh, const RunContext& context) {
     return Success{};
 }
 
-std::string warning_of(const CellReport& cells, const OutwardReport& outward) {
+std::string warning_of(const Body& body, const BodyReport& report) {
     constexpr double kManyThin = 0.05; // of the cells; below, toes and ears that nobody sees bend too much
-    std::string warning = outward_sentence(outward);
-    if (double(cells.thin_cells) > kManyThin * double(cells.cells))
-        warning += (warning.empty() ? "" : " ") + std::to_string(cells.thin_cells) + " of " +
-                   std::to_string(cells.cells) +
-                   " cells lie in parts fewer than two cells across, which will be too soft or too stiff there; more "
-                   "particles make them right.";
-    if (cells.loose_parts > 0)
-        warning += (warning.empty() ? "" : " ") + std::to_string(cells.loose_parts) +
-                   " small unconnected part(s) have no particles of their own and go along with the nearest ones.";
+    std::string warning = outward_sentence(report.outward);
+    const auto add = [&](const std::string& sentence) {
+        if (!sentence.empty()) warning += (warning.empty() ? "" : " ") + sentence;
+    };
+    const CellReport& cells = report.cells;
+    const bool bends = body.material.model != MaterialModel::rigid && cells.cells >= kFewestElasticCells;
+    if (bends && double(cells.thin_cells) > kManyThin * double(cells.cells))
+        add(std::to_string(cells.thin_cells) + " of " + std::to_string(cells.cells) +
+            " cells lie in parts fewer than two cells across, which will be too soft or too stiff there; more "
+            "particles make them right.");
+    add(joined_sentence(report.joined, body.spacing(), body.particle_count()));
     return warning;
 }
+
+/// Metres a model unit. Errors: usage, unsuitable (a mesh without extent that is given a size).
+Result<double> scale_of(const Mesh& mesh, const BodyOptions& options) {
+    if (!options.size) return options.scale;
+    if (options.scale != BodyOptions{}.scale) return Error{ErrorCode::usage, "Give scale or size, not both."};
+    if (!std::isfinite(*options.size) || *options.size <= 0)
+        return Error{ErrorCode::usage, "The size is " + mesh_cells::number(*options.size) +
+                                           "; give the metres of the mesh's longest side, above 0."};
+    const double longest = bounds(mesh).size().maxCoeff();
+    if (!(longest > 0))
+        return Error{ErrorCode::unsuitable, "The mesh has no extent, so there is nothing to give a size to."};
+    return *options.size / longest;
+}
+
+bool joins_by_cells(MaterialModel model) { return model != MaterialModel::rigid && model != MaterialModel::mpm; }
 
 } // namespace
 
@@ -239,20 +259,27 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
     BodyReport ignored;
     BodyReport& found = report ? *report : ignored;
     found = {};
+    const Result<double> scale = scale_of(mesh, options);
+    if (!scale) return scale.error();
     const Result<WeldedTriangles> welded = weld_triangles(mesh, context);
     if (!welded) return welded.error();
     const auto count = [&](const Cells& cells) { return count_particles(cells, material.model, context); };
-    Result<Cells> cells = make_cells(mesh, *welded, options.scale, options.cells, count, context, &found.cells);
+    Result<Cells> cells = make_cells(mesh, *welded, *scale, options.cells, count, context, &found.cells);
     if (!cells) return cells.error();
 
     Body body;
     body.material = material;
-    body.scale = options.scale;
+    body.scale = *scale;
     body.cells = std::move(cells).value();
+    if (joins_by_cells(material.model)) {
+        const Result<JoinedParts> joined = find_joined_parts(mesh.positions, *welded, *scale, body.cells, context);
+        if (!joined) return joined.error();
+        found.joined = *joined;
+    }
     if (!uses_centroids(material.model)) share_with_neighbours(body.cells);
     found.split_cells = make_particles(body, context);
     SurfacePoints spread =
-        spread_on_surface(mesh.positions, welded->triangles, options.scale, point_spacing(material) * body.spacing());
+        spread_on_surface(mesh.positions, welded->triangles, *scale, point_spacing(material) * body.spacing());
     body.surface.normals = std::move(spread.normals);
     body.surface.areas = std::move(spread.areas);
     body.surface.points = embed_surface(spread.positions, body, context);
@@ -262,7 +289,7 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
     found.surface_points = body.surface.points.size();
     for (const float mass : body.mass) found.mass += mass;
     found.outward = welded->outward;
-    found.warning = warning_of(found.cells, found.outward);
+    found.warning = warning_of(body, found);
     return body;
 }
 

@@ -8,6 +8,7 @@
 #include "filigree/physics/vectors.h"
 
 #include <memory>
+#include <optional>
 
 namespace filigree {
 
@@ -45,8 +46,16 @@ struct Body {
 };
 
 struct BodyOptions {
-    double scale = 1;  ///< metres a model unit, above 0
-    CellOptions cells; ///< count: of particles, about
+    double scale = 1;                ///< metres a model unit, above 0; or
+    std::optional<double> size = {}; ///< m, above 0: the longest side of the mesh's box
+    CellOptions cells;               ///< count: of particles, about
+};
+
+/// Parts of a closed mesh that are apart, but so near each other that cells hold both.
+struct JoinedParts {
+    std::size_t corners = 0;     ///< of cells that join them; 0: none, or too few to matter
+    Vec3f place = Vec3f::Zero(); ///< m, where the gap is narrowest, on the body at rest
+    double gap = 0;              ///< m, about: at half of these corners it is wider
 };
 
 struct BodyReport {
@@ -55,10 +64,11 @@ struct BodyReport {
     std::size_t surface_points = 0;
     double mass = 0;       ///< kg
     OutwardReport outward; ///< what of the mesh counts as turned
-    std::string warning;   ///< sentences where much is fewer than two cells across, parts are left out or turned; or ""
+    JoinedParts joined;    ///< fem, springs, meshfree: parts of the mesh that move as one
+    std::string warning;   ///< sentences: much is fewer than two cells across, parts are joined or turned; or ""
 };
 
-/// A body from a mesh. Errors: as make_cells; usage (check_material, scale).
+/// A body from a mesh. Errors: as make_cells; usage (check_material, scale, size, both of them).
 Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOptions& options,
                        const RunContext& context, BodyReport* report = nullptr);
 

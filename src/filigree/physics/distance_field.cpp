@@ -155,10 +155,16 @@ Result<DistanceField> DistanceField::create(const Mesh& mesh, double scale, doub
     if (!std::isfinite(spacing) || spacing < 0)
         return Error{ErrorCode::usage,
                      "The spacing is " + short_number(spacing) + "; give metres, above 0 (or 0 to have it chosen)."};
-    const Result<WeldedTriangles> welded_triangles = weld_triangles(mesh, context);
+    Result<WeldedTriangles> welded_triangles = weld_triangles(mesh, context);
     if (!welded_triangles) return welded_triangles.error();
-    const WeldedTriangles& welded = *welded_triangles;
+    WeldedTriangles welded = *std::move(welded_triangles);
     if (outward) *outward = welded.outward;
+    const bool has_inside = !welded.triangles.empty();
+    if (!has_inside) { // faces that are all there twice enclose nothing, and are there
+        Result<Surface> surface = make_surface(mesh, context);
+        if (!surface) return surface.error();
+        welded.triangles = std::move(surface->triangles);
+    }
     if (welded.triangles.empty())
         return Error{ErrorCode::unsuitable, "The mesh has no faces with an area, so nothing has a distance from it."};
     Box box;
@@ -217,7 +223,7 @@ Result<DistanceField> DistanceField::create(const Mesh& mesh, double scale, doub
             for (std::size_t i = 0; i < grid.counts[0]; ++i) {
                 float& distance = distances[grid.index(i, j, k)];
                 distance = float(distance * scale);
-                if (inside->contains(i, j, k)) distance = -distance;
+                if (has_inside && inside->contains(i, j, k)) distance = -distance;
             }
     field.distances_ = std::move(distances);
     return field;

@@ -20,7 +20,7 @@ constexpr double kRadiusGrowth = 1.25; // where the particles in it do not do
 constexpr int kAttempts = 6;
 constexpr double kLeastWeight = -0.5; // beyond, a weight makes more of the noise of its particle than of its motion
 /// Least weight of what only follows: -0.05 to -0.3 are the nearest to a body of eight times the particles, and half
-/// as far from what a driver restores as without a bound (docs/bodies.md).
+/// as far from what a driver restores as without a bound (docs/bodies-theory.md).
 constexpr double kFollowingWeight = -0.05;
 /// 27 det / trace^3 of the particles' covariance, 1 for a round cloud: below, they count as lying in a plane.
 constexpr double kSpanning = 2e-3;

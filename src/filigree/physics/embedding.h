@@ -50,7 +50,7 @@ Embedding embed_corners(const Cells& cells, const Vectors& rest, const RunContex
 /// Points that go along with others, which go along with particles: by which particles, then.
 Embedding carried_on(const Embedding& points, const Embedding& carriers);
 
-/// Where the points went, and the deformation gradients there, by the Hermite form of docs/bodies.md:
+/// Where the points went, and the deformation gradients there, by the Hermite form of docs/bodies-theory.md:
 ///     A = sum w F_j,   c' = sum w (x_j + 1/2 (F_j + A) (c - X_j)).
 /// An affine motion of the particles is followed exactly. `gradients` may be empty: not wanted. Cost O(weights).
 void move_embedded(const Embedding& embedding, const Vectors& rest, const Vectors& positions,

@@ -10,11 +10,24 @@ namespace {
 template <class Set>
 NamedMaterial made(std::string_view name, std::string_view text, double density, double young, double poisson,
                    const Set& set) {
-    NamedMaterial named{name, text, {}};
+    NamedMaterial named{.name = name, .text = text, .material = {}};
     named.material.density = density;
     named.material.young_modulus = young;
     named.material.poisson_ratio = poisson;
     set(named.material);
+    return named;
+}
+
+/// Stiffness is a thousandth of the real one or less, so that frames take few steps: what is left is how it breaks.
+/// strength: Pa; energy: J/m^2.
+NamedMaterial brittle(std::string_view name, std::string_view text, double density, double young, double poisson,
+                      double strength, double energy) {
+    NamedMaterial named = made(name, text, density, young, poisson, [](Material& m) {
+        m.damping = 0.1;
+        m.internal_damping = 1e-4;
+    });
+    named.strength = strength;
+    named.energy = energy;
     return named;
 }
 
@@ -51,6 +64,9 @@ std::span<const NamedMaterial> named_materials() {
                  m.model = MaterialModel::rigid;
                  m.damping = 0.1;
              }),
+        brittle("brittle-stone", "breaks where it is hit hard", 2600, 2e7, 0.2, 1e5, 20),
+        brittle("glass", "breaks easily, into splinters", 2500, 3e7, 0.25, 1e5, 4),
+        brittle("plaster", "light; crumbles", 1200, 1e7, 0.2, 4e4, 4),
         made("clay", "keeps the shape it is pressed into", 1700, 2e5, 0.35,
              [](Material& m) {
                  m.model = MaterialModel::meshfree;

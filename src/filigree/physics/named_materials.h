@@ -11,8 +11,8 @@ namespace filigree {
 struct NamedMaterial {
     std::string_view name, text; ///< text: what it does, a few words
     Material material;
+    double strength = 0, energy = 0; ///< of what breaks, for FractureMaterial: Pa, J/m^2; 0: by its stiffness
 };
-/// Rubber, soft-rubber, jelly, foam, wood, metal, lattice (springs), clay and wax.
 std::span<const NamedMaterial> named_materials();
 
 } // namespace filigree

@@ -4,6 +4,7 @@
 #include "filigree/physics/rigid/rigid_body.h"
 #include "filigree/physics/rigid/rigid_state.h"
 #include "filigree/physics/rigid/sleep.h"
+#include "filigree/physics/step/inverted_cells.h"
 #include "filigree/physics/step/lost_particles.h"
 #include "filigree/physics/step/simulation_state.h"
 
@@ -21,8 +22,7 @@ Error usage(std::string sentence) { return {ErrorCode::usage, std::move(sentence
 Status check_options(const StepOptions& options) {
     if (!(options.frames_per_second > 0 && std::isfinite(options.frames_per_second)))
         return usage("The number of frames a second must be above 0.");
-    if (options.most_substeps == 0 || options.descent_substeps == 0 || options.descent_iterations == 0)
-        return usage("Substeps and iterations are counted from 1.");
+    if (options.most_substeps == 0) return usage("Substeps are counted from 1.");
     return Success{};
 }
 
@@ -72,6 +72,8 @@ BodyState begin_on_grid(SimulationState& state, const Actor& actor, std::size_t 
     body.is_on_grid = body.is_absent = true;
     body.fixed.assign(body.positions.size(), 0);
     body.inverse_mass.assign(body.positions.size(), 0);
+    body.forces = Vectors(body.positions.size());
+    body.rest_squared_frequency = state.grid->rest_squared_frequency(number);
     state.grid->set_positions(number, body.positions);
     state.grid->set_velocities(number, body.velocities);
     Mat3f turning;
@@ -101,9 +103,8 @@ public:
         if (const std::size_t cells = body.cells.cells.size(); cells < kFewestElasticCells)
             return "it has only " + std::to_string(cells) + (cells == 1 ? " cell" : " cells");
         const double substeps = substeps_at_rest(state);
-        if (options_.mode != StepMode::automatic || substeps <= kMostElasticSubsteps * options_.most_substeps)
-            return "";
-        return "elastic, it would need " + with_commas(std::uint64_t(substeps)) + " explicit substeps a frame";
+        if (options_.mode != StepMode::automatic || substeps <= options_.most_substeps) return "";
+        return "elastic, it would need " + with_commas(std::uint64_t(substeps)) + " substeps a frame";
     }
     std::shared_ptr<const Body> rigid(const std::shared_ptr<const Body>& body) {
         std::shared_ptr<const Body>& found = made_[body];
@@ -121,6 +122,9 @@ private:
     std::map<std::shared_ptr<const Body>, std::shared_ptr<const Body>> made_;
 };
 
+/// Whether particles are corners of cells that deform.
+bool has_cells(MaterialModel model) { return model == MaterialModel::fem || model == MaterialModel::springs; }
+
 void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunContext& context) {
     AutomaticRigid automatic(state.world, state.options, actors);
     for (Actor& actor : actors) {
@@ -136,6 +140,7 @@ void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunC
             actor.body = automatic.rigid(actor.body);
             body = begin_body(actor, number, context);
         }
+        if (has_cells(body.body->material.model)) find_light_corners(body);
         state.bodies.push_back(std::move(body));
     }
 }
@@ -150,7 +155,6 @@ void begin_pieces(SimulationState& state, std::span<const Actor> actors, const R
         for (const std::shared_ptr<const Body>& piece : actors[a].fracture->body->pieces) {
             state.bodies.push_back(begin_body({piece, actors[a].placement}, a, context));
             state.bodies.back().is_absent = true;
-            state.bodies.back().elasticity->prepare_blocks();
             find_light_corners(state.bodies.back());
         }
         state.cracks.emplace_back(actors[a].fracture, a, first);
@@ -174,8 +178,11 @@ void begin_pins(SimulationState& state) {
         }
         body.is_held = true;
     }
-    state.grid->begin_pins();
-    move_pins(state, 0, 0);
+    for (const BodyState& body : state.bodies)
+        if (body.is_on_grid) state.grid->set_fixed(body.actor, body.fixed);
+    for (const bool on_grid : {false, true}) move_pins(state, 0, 0, on_grid);
+    for (const BodyState& body : state.bodies)
+        if (body.is_on_grid) state.grid->move_fixed(body.actor, body.positions, body.velocities);
 }
 
 std::vector<Grip> make_grips(std::span<const Hand> hands, const SimulationState& state, const RunContext& context) {
@@ -188,11 +195,6 @@ std::vector<Grip> make_grips(std::span<const Hand> hands, const SimulationState&
         grips.push_back(make_grip(hand, state.bodies[hand.body], context));
     }
     return grips;
-}
-
-bool is_finite(const SimulationState& state) {
-    return std::ranges::all_of(
-        state.bodies, [](const BodyState& body) { return is_finite(body.positions) && is_finite(body.velocities); });
 }
 
 /// Where plastic strain has come to its limit.
@@ -208,50 +210,39 @@ void note_flow(const SimulationState& state, FrameReport& report) {
     }
 }
 
-/// One frame, whatever way it takes. Cancelled work leaves the state half done.
-Result<FrameReport> step_frame(SimulationState& state, const SavedState& start, const RunContext& context) {
-    const double from = state.time(), until = double(state.frame + 1) * state.frame_seconds();
-    FrameReport report;
+/// Substeps until the frame ends. What is not finite is held on the way, and the rest of the frame goes on from there;
+/// a state that is lost again and again stays as it is until the next frame. Returns how many particles were held.
+std::size_t step_bodies(SimulationState& state, double from, double until, FrameReport& report,
+                        const RunContext& context) {
+    constexpr int kMostRepairs = 4;
     std::size_t held = 0;
     const auto hold_lost = [&] {
         const std::size_t more = hold_lost_particles(state);
+        for (std::size_t b = 0; b < state.bodies.size() && more > 0; ++b) state.contacts.was_placed(b);
         if (more > 0) state.contacts.begin_anew();
         held += more;
     };
     hold_lost();
-    const bool began_lost = held > 0;
+    for (int repairs = 0; from < until && repairs <= kMostRepairs && !context.is_cancelled(); ++repairs) {
+        from = step_explicitly(state, from, until, report, context);
+        hold_lost();
+    }
+    return held;
+}
+
+/// One frame. Cancelled work leaves the state half done.
+Result<FrameReport> step_frame(SimulationState& state, const RunContext& context) {
+    const double from = state.time(), until = double(state.frame + 1) * state.frame_seconds();
+    FrameReport report;
     state.contacts.clear_touches();
     state.external.find_wind(state.bodies, from, state.options.frames_per_second, context);
-
-    double reached = from;
-    DescentCause cause = DescentCause::chosen;
-    if (state.options.mode != StepMode::descent && began_lost) {
-        cause = DescentCause::not_finite; // the frame began so
-    } else if (state.options.mode != StepMode::descent) {
-        reached = step_explicitly(state, from, until, report, context);
-        cause = DescentCause::too_many_substeps;
-    }
+    std::size_t held = step_bodies(state, from, until, report, context);
     if (context.is_cancelled()) return cancelled_error();
-    if (!is_finite(state)) { // an explicit frame that failed is done again
-        if (Status undone = restore_state(state, start); !undone) return undone.error();
-        hold_lost_particles(state);
-        report = {.elastic_seconds = report.elastic_seconds,
-                  .contact_seconds = report.contact_seconds,
-                  .other_seconds = report.other_seconds};
-        reached = from;
-        cause = DescentCause::not_finite;
-    }
-    if (reached < until) {
-        report.used = StepMode::descent;
-        report.why_descent = cause;
-        step_by_descent(state, reached, until, report, context);
-    }
-    state.grid->advance(from, until, report, context);
-    for (BodyState& body : state.bodies)
-        if (body.is_on_grid) state.grid->read(body.actor, body.positions, body.velocities);
+    step_on_grid(state, from, until, report, context);
     if (context.is_cancelled()) return cancelled_error();
-    hold_lost();
+    held += hold_lost_particles(state);
     report.clamped_particles += held;
+    tell_first_lost(state, report);
     report.most_crushed = state.bodies[report.most_crushed].actor;
     note_flow(state, report);
     for (const Cracks& cracks : state.cracks) cracks.show_whole(state.bodies);
@@ -279,7 +270,6 @@ public:
         [[maybe_unused]] const Status undone = restore_state(state_, std::move(start_));
         assert(undone.ok());
     }
-    const SavedState& state() const { return start_; }
     void keep() { is_whole_ = true; }
 
 private:
@@ -318,13 +308,14 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
         if (!cracks.set_memory(cracks.memory(), state->bodies)) assert(false); // works out what follows from it
     place_corners(state->bodies, context);
     state->contacts.begin(state->bodies);
+    state->start_overlaps = find_start_overlaps(state->world, state->bodies);
     return Simulation(std::move(state));
 }
 
 Result<FrameReport> Simulation::advance(const RunContext& context) {
     if (context.is_cancelled()) return cancelled_error();
     UnlessWhole start(*state_);
-    Result<FrameReport> report = step_frame(*state_, start.state(), context);
+    Result<FrameReport> report = step_frame(*state_, context);
     if (report) start.keep();
     return report;
 }
@@ -338,6 +329,7 @@ const Body& Simulation::body(std::size_t body) const {
     assert(body < body_count());
     return *state_->bodies[body].body;
 }
+const std::vector<StartOverlap>& Simulation::start_overlaps() const { return state_->start_overlaps; }
 const std::string& Simulation::why_rigid(std::size_t body) const {
     assert(body < body_count());
     return state_->why_rigid[body];
@@ -356,6 +348,7 @@ Status Simulation::set_positions(std::size_t body, const Vectors& positions) {
     state_->bodies[body].positions = positions;
     fit_rigid(*state_, state_->bodies[body]);
     if (state_->bodies[body].is_on_grid) state_->grid->set_positions(body, positions);
+    state_->contacts.was_placed(body);
     state_->contacts.begin_anew();
     return Success{};
 }
@@ -385,8 +378,6 @@ Status Simulation::check_vectors(std::size_t body, const Vectors& vectors, const
 
 Status Simulation::set_hands(std::vector<Hand> hands, const RunContext& context) {
     if (Status checked = check_hands(hands, body_count()); !checked) return checked;
-    for (const Hand& hand : hands)
-        if (state_->bodies[hand.body].is_on_grid) return usage("Hands do not hold bodies of the model mpm.");
     for (const Cracks& cracks : state_->cracks)
         if (!cracks.is_open()) cracks.follow_whole(state_->bodies);
     state_->external.set_grips(make_grips(hands, *state_, context));
@@ -397,8 +388,6 @@ Status Simulation::set_hands(std::vector<Hand> hands, const RunContext& context)
 Status Simulation::set_forces(std::size_t body, const Vectors& newtons) {
     if (newtons.size() > 0 || body >= body_count())
         if (Status checked = check_count(body, newtons, "forces"); !checked) return checked;
-    if (state_->bodies[body].is_on_grid && newtons.size() > 0)
-        return usage("Forces on single particles do not act on bodies of the model mpm.");
     for (std::size_t i = 0; i < newtons.size(); ++i)
         if (!newtons[i].allFinite())
             return usage("The force on particle " + std::to_string(i) + " of body " + std::to_string(body) +
@@ -445,6 +434,11 @@ Momentum Simulation::momentum() const {
     }
     momentum.angular += state_->grid->affine_momentum();
     return momentum;
+}
+
+InvertedCells Simulation::inverted(std::size_t body) const {
+    assert(body < body_count());
+    return inverted_cells(*state_, body);
 }
 
 FractureReport Simulation::fracture(std::size_t body) const {

@@ -19,36 +19,24 @@ struct Actor {
     bool may_sleep = true;
 };
 
-/// explicit_steps: velocity Verlet, as many substeps as stability asks for; where that is more than 20,000 a frame, or
-/// what comes of it is not finite, descent takes over for the frame, and the report says why. descent: vertex block
-/// descent, a fixed number of implicit substeps. automatic: the first where it takes no more than most_substeps, else
-/// the second. A frame that was begun in the first way may take up to twice as many.
-enum class StepMode { automatic, explicit_steps, descent };
+/// automatic: bodies that would need too many substeps become rigid, StepOptions::automatic_rigid. explicit_steps:
+/// those of 8 cells and more stay elastic, whatever they cost.
+enum class StepMode { automatic, explicit_steps };
 
 struct StepOptions {
     double frames_per_second = 60;
     StepMode mode = StepMode::automatic;
-    /// A descent frame costs as much as some 120 explicit substeps. Where bodies meet so fast that descent needs up to
-    /// 16 times as many of its own, explicit ones may be as many times more.
-    unsigned most_substeps = 256;
-    unsigned descent_substeps = 4, descent_iterations = 8;
     bool contacts_between_bodies = true, contacts_within_bodies = true;
-    /// Whether bodies of fem and springs become rigid that have fewer than kFewestElasticCells cells, or for which
-    /// `automatic` would need more than kMostElasticSubsteps times most_substeps. Those that are pinned stay elastic.
+    /// Whether bodies of fem and springs become rigid that have fewer than kFewestElasticCells cells, or that would
+    /// need more than most_substeps a frame at rest. Those that are pinned, that yield or that break stay elastic.
     bool automatic_rigid = true;
+    unsigned most_substeps = 500;
 };
 inline constexpr std::size_t kFewestElasticCells = 8;
-inline constexpr double kMostElasticSubsteps = 4;
-
-/// Why a frame was made by descent, or finished by it. chosen: the options say so. too_many_substeps: explicit steps
-/// would have been more than the mode allows. not_finite: they did not come to numbers, and the frame was done again.
-enum class DescentCause { none, chosen, too_many_substeps, not_finite };
 
 /// What a frame took and met.
 struct FrameReport {
-    StepMode used = StepMode::explicit_steps;
-    DescentCause why_descent = DescentCause::none;
-    unsigned substeps = 0;
+    unsigned substeps = 0;        ///< of velocity Verlet, as many as stability asked for
     std::size_t contacts = 0;     ///< surface points that touch something, at the frame's end
     double deepest_contact = 0;   ///< m below an obstacle's surface
     double deepest_in_matter = 0; ///< m that a point of a surface lay inside another body, or its own
@@ -61,6 +49,15 @@ struct FrameReport {
     std::size_t most_flowed = 0; ///< the body that has most of them
     double elastic_seconds = 0, contact_seconds = 0, other_seconds = 0;
     std::size_t clamped_particles = 0; ///< whose motion was not finite, or whose start was scaled down
+    std::size_t clamped_body = 0;      ///< that the first of them is of
+    Vec3f clamped_at = Vec3f::Zero();  ///< world, m: where that one stands
+};
+
+/// Cells that are inside out.
+struct InvertedCells {
+    std::size_t count = 0;
+    float least = 1;             ///< the smallest volume of all of the body's cells, as a part of that at rest
+    Vec3f place = Vec3f::Zero(); ///< world, m: the middle of that one
 };
 
 struct Energy {
@@ -80,6 +77,15 @@ Status check_world(const World& world, std::span<const Actor> actors);
 Status check_hands(std::span<const Hand> hands, std::size_t body_count);
 Status check_air(const Keyed<double>& temperature, double heat_transfer);
 Status check_heat_sources(std::span<const HeatSource> sources);
+
+/// A body that starts inside of an obstacle, or across its surface.
+struct StartOverlap {
+    std::size_t body = 0, obstacle = 0;
+    double depth = 0;       ///< m, most that a surface point lies beyond
+    bool is_inside = false; ///< all of it lies inside of a closed mesh, and stays there
+    /// As in "body 'a' starts inside obstacle 'b', ...", without a full stop.
+    std::string sentence(const std::string& body_name, const std::string& obstacle_name) const;
+};
 
 struct SimulationState;
 
@@ -105,6 +111,8 @@ public:
     const Body& body(std::size_t body) const; ///< as it is moved: rigid where automatic_rigid made it so
     /// Why automatic_rigid made a body rigid, as in "it has only 5 cells"; "" where it did not.
     const std::string& why_rigid(std::size_t body) const;
+    /// What should be told before the run: bodies deeper in obstacles than 3/4 of their spacing when they were created.
+    const std::vector<StartOverlap>& start_overlaps() const;
     const Vectors& positions(std::size_t body) const;  ///< world, m; broken: of the heaviest of each corner's copies
     const Vectors& velocities(std::size_t body) const; ///< m/s
     /// For tests, and for whoever starts a body in another shape. Values may be anything; the next frame repairs what
@@ -129,6 +137,8 @@ public:
     Energy energy(const RunContext& context) const;
     Momentum momentum() const;
     FractureReport fracture(std::size_t body) const;
+    /// As a body's cells are now, pieces' included; of models without cells, and of rigid bodies, none. Cost O(cells).
+    InvertedCells inverted(std::size_t body) const;
 
     /// Points that go along with a body: its driver, or all of a mesh. Positions on the body at rest, m.
     /// Returns a number for `attached`. Cost: as embed.

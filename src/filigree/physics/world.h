@@ -48,10 +48,18 @@ struct Ball {
 struct Cuboid {
     Vec3d centre = Vec3d::Zero(), size = Vec3d::Ones(); ///< along the axes before the obstacle's motion
 };
+class ObstacleSurface; // contact/obstacle_surface.h
+/// Its triangles are walls with two sides, whether they close or not: nothing goes through them, from wherever it
+/// comes. What starts inside of a closed one stays in it, as in a room.
 struct MeshObstacle {
-    std::shared_ptr<const DistanceField> field;
-    Vec3d offset = Vec3d::Zero(); ///< added to the field's coordinates
+    std::shared_ptr<const DistanceField> field; ///< a coarse picture of it, for what asks on a grid
+    Vec3d offset = Vec3d::Zero();               ///< added to the field's and the surface's coordinates
+    /// Null: it is as solid as `field` says, and no sharper.
+    std::shared_ptr<const ObstacleSurface> surface = nullptr;
 };
+/// The one way from a mesh to an obstacle; `offset` is 0. Arguments and errors: as DistanceField::create.
+Result<MeshObstacle> make_mesh_obstacle(const Mesh& mesh, double scale, double spacing, const RunContext& context,
+                                        OutwardReport* outward = nullptr);
 
 /// Something solid that bodies touch and that does not feel them.
 struct Obstacle {

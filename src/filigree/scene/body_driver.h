@@ -38,9 +38,9 @@ struct ExpectedError {
 };
 
 /// Both grow with how much gradients differ along the driver's edges, the former with the spacing's square, the latter
-/// with the edges'. Measured on six scenes (docs/bodies.md): the former is right within a factor of 3, but for a bar
-/// whose cells lie along its surface (4.5 too large), the latter within 2. poses: in metres, with gradients; the first
-/// is the start. Cost O(frames x driver).
+/// with the edges'. Measured on six scenes (docs/bodies-theory.md): the former is right within a factor of 3, but for a
+/// bar whose cells lie along its surface (4.5 too large), the latter within 2. poses: in metres, with gradients; the
+/// first is the start. Cost O(frames x driver).
 ExpectedError expected_error(const PoseSequence& poses, const DriverEdges& edges, const Model& model, const Body& body);
 
 } // namespace filigree

@@ -1,6 +1,7 @@
 #include "filigree/scene/dropped_body.h"
 
 #include "filigree/mesh/shapes.h"
+#include "filigree/physics/own_weight.h"
 #include "filigree/scene/body_driver.h"
 #include "filigree/scene/particles_near.h"
 
@@ -198,10 +199,19 @@ Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<con
     Result<Body> body = make_body(whole, options.material, body_options, context, &dropped->report);
     if (!body) return body.error();
     dropped->body = std::make_shared<const Body>(std::move(*body));
+    const auto warn = [&](const std::string& sentence) {
+        std::string& said = dropped->report.warning;
+        if (!sentence.empty()) said += (said.empty() ? "" : " ") + sentence;
+    };
+    const Vec3d gravity = options.gravity ? Vec3d(-kEarthGravity * up) : Vec3d(Vec3d::Zero());
+    if (const std::string weight =
+            weight_warning(*dropped->body, Mat3d::Identity(), gravity, "such soft matter", options.size);
+        !weight.empty())
+        warn("The body " + weight);
     if (const std::string coarse =
             driver_warning(measure_driver(*dropped->model, *dropped->body), *dropped->model, *dropped->body);
         !coarse.empty())
-        dropped->report.warning += (dropped->report.warning.empty() ? "" : " ") + coarse;
+        warn(coarse);
     if (breaking) {
         FractureMaterial material;
         const double stiffness = options.material.young_modulus;

@@ -6,7 +6,6 @@ namespace filigree {
 
 void RunTotals::add(const FrameReport& report) {
     ++frames;
-    ++(report.used == StepMode::descent ? descent_frames : explicit_frames);
     substeps += report.substeps;
     least_substeps = std::min<std::uint64_t>(least_substeps, report.substeps);
     most_substeps = std::max<std::uint64_t>(most_substeps, report.substeps);
@@ -23,22 +22,6 @@ void RunTimes::add(const FrameReport& report) {
     elastic += report.elastic_seconds;
     contact += report.contact_seconds;
     other += report.other_seconds;
-}
-
-void DescentCauses::add(const FrameReport& report) {
-    switch (report.why_descent) {
-    case DescentCause::none:
-        break;
-    case DescentCause::chosen:
-        ++chosen;
-        break;
-    case DescentCause::too_many_substeps:
-        ++too_many_substeps;
-        break;
-    case DescentCause::not_finite:
-        ++not_finite;
-        break;
-    }
 }
 
 std::size_t hold_lost(const Pose& before, Pose& now, float far, float most_gradient) {

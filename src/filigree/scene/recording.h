@@ -3,6 +3,7 @@
 
 #include "filigree/hierarchy/pose.h"
 #include "filigree/physics/simulation.h"
+#include "filigree/scene/doubts.h"
 
 #include <cstdint>
 #include <optional>
@@ -21,7 +22,7 @@ struct CheckTotals {
 
 /// Sums over all frames so far. No times: equal runs have equal totals.
 struct RunTotals {
-    std::uint64_t frames = 0, explicit_frames = 0, descent_frames = 0;
+    std::uint64_t frames = 0;
     std::uint64_t substeps = 0, least_substeps = ~std::uint64_t{0}, most_substeps = 0, clamped_particles = 0,
                   most_contacts = 0;
     double deepest_contact = 0, deepest_in_matter = 0; ///< m
@@ -42,41 +43,15 @@ struct RunTimes {
     void add(const FrameReport& report);
 };
 
-/// Frames that descent made or finished, by cause.
-struct DescentCauses {
-    std::uint64_t chosen = 0, too_many_substeps = 0, not_finite = 0;
-
-    void add(const FrameReport& report);
-};
-
-/// How far a body was crushed.
-struct Crush {
-    std::uint64_t first = 0, worst = 0; ///< frames: first in which a cell kept too little, and of the least volume
-    float least = 1;                    ///< volume of a cell, of that at rest
-};
-
-/// Cells or particles that have come to the limit of plastic strain.
-struct FlowedOut {
-    std::uint64_t first = 0; ///< frame
-    std::uint64_t most = 0;  ///< of them
-};
-
-/// What makes a body's motion doubtful.
-struct BodyDoubts {
-    std::optional<std::uint64_t> first_lost; ///< the first frame in which hold_lost held some
-    std::optional<Crush> crush;
-    std::optional<FlowedOut> flowed_out;
-};
-
 struct Recording {
     std::vector<PoseSequence> poses;                        ///< one a body; the first is the start
     std::vector<std::vector<std::vector<Vec3f>>> particles; ///< of each body and frame, where they are drawn
     std::vector<std::vector<MatterParticles>> matter;       ///< of each body and frame; none of bodies not of mpm
     std::vector<CheckTotals> checks;                        ///< one a body where that was asked for, else none
     RunTotals totals;
-    DescentCauses descent_causes;
     std::vector<BodyDoubts> doubts; ///< one a body
-    float last_volume_ratio = 1;    ///< the least of the last frame
+    std::optional<FirstLoss> first_loss;
+    EnergyWatch energy;
 };
 
 /// Driver vertices that went nowhere sensible in a frame stay where they were, so that one does not spoil all.

@@ -2,6 +2,7 @@
 
 #include "filigree/physics/step/byte_stream.h"
 
+#include <algorithm>
 #include <cstring>
 
 #define XXH_INLINE_ALL
@@ -11,11 +12,11 @@ namespace filigree {
 
 namespace {
 
-constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTAT7"; // ends in the version
+constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTAT9"; // ends in the version
 
 void write_totals(ByteWriter& out, const RunTotals& t) {
-    for (const std::uint64_t count : {t.frames, t.explicit_frames, t.descent_frames, t.substeps, t.least_substeps,
-                                      t.most_substeps, t.clamped_particles, t.most_contacts})
+    for (const std::uint64_t count :
+         {t.frames, t.substeps, t.least_substeps, t.most_substeps, t.clamped_particles, t.most_contacts})
         out.value(count);
     out.value(t.deepest_contact);
     out.value(t.deepest_in_matter);
@@ -26,8 +27,8 @@ void write_totals(ByteWriter& out, const RunTotals& t) {
 
 RunTotals read_totals(ByteReader& in) {
     RunTotals t;
-    for (std::uint64_t* count : {&t.frames, &t.explicit_frames, &t.descent_frames, &t.substeps, &t.least_substeps,
-                                 &t.most_substeps, &t.clamped_particles, &t.most_contacts})
+    for (std::uint64_t* count :
+         {&t.frames, &t.substeps, &t.least_substeps, &t.most_substeps, &t.clamped_particles, &t.most_contacts})
         *count = in.value<std::uint64_t>();
     t.deepest_contact = in.value<double>();
     t.deepest_in_matter = in.value<double>();
@@ -37,40 +38,79 @@ RunTotals read_totals(ByteReader& in) {
     return t;
 }
 
+void write_point(ByteWriter& out, const Vec3f& point) {
+    for (int axis = 0; axis < 3; ++axis) out.value(point[axis]);
+}
+
+Vec3f read_point(ByteReader& in) {
+    Vec3f point;
+    for (int axis = 0; axis < 3; ++axis) point[axis] = in.value<float>();
+    return point;
+}
+
+void write_energy(ByteWriter& out, const EnergyWatch& watch) {
+    for (const std::uint64_t count : {std::uint64_t(watch.has_begun), watch.first, watch.worst, watch.body})
+        out.value(count);
+    for (const double joules :
+         {watch.total, watch.moving, watch.potential, watch.least_potential, watch.grown, watch.share})
+        out.value(joules);
+    write_point(out, watch.place);
+}
+
+EnergyWatch read_energy(ByteReader& in) {
+    EnergyWatch watch;
+    watch.has_begun = in.value<std::uint64_t>() != 0;
+    for (std::uint64_t* count : {&watch.first, &watch.worst, &watch.body}) *count = in.value<std::uint64_t>();
+    for (double* joules :
+         {&watch.total, &watch.moving, &watch.potential, &watch.least_potential, &watch.grown, &watch.share})
+        *joules = in.value<double>();
+    watch.place = read_point(in);
+    return watch;
+}
+
 void write_doubts(ByteWriter& out, const Recording& recording) {
-    const DescentCauses& causes = recording.descent_causes;
-    for (const std::uint64_t count : {causes.chosen, causes.too_many_substeps, causes.not_finite}) out.value(count);
-    out.value(recording.last_volume_ratio);
     for (const BodyDoubts& body : recording.doubts) {
-        const Crush crush = body.crush.value_or(Crush{});
+        const Inversion inversion = body.inversion.value_or(Inversion{});
         const FlowedOut flowed = body.flowed_out.value_or(FlowedOut{});
-        out.value(std::uint64_t(body.first_lost.has_value()) + 2 * std::uint64_t(body.crush.has_value()) +
+        out.value(std::uint64_t(body.first_lost.has_value()) + 2 * std::uint64_t(body.inversion.has_value()) +
                   4 * std::uint64_t(body.flowed_out.has_value()));
-        for (const std::uint64_t number :
-             {body.first_lost.value_or(0), crush.first, crush.worst, flowed.first, flowed.most})
-            out.value(number);
-        out.value(crush.least);
+        out.value(body.first_lost.value_or(0));
+        for (const std::uint64_t count : {inversion.first, inversion.last, inversion.frames, inversion.worst,
+                                          inversion.cells, flowed.first, flowed.most})
+            out.value(count);
+        out.value(inversion.least);
+        write_point(out, inversion.place);
     }
+    const FirstLoss loss = recording.first_loss.value_or(FirstLoss{});
+    for (const std::uint64_t count : {std::uint64_t(recording.first_loss.has_value()), loss.frame, loss.body})
+        out.value(count);
+    write_point(out, loss.place);
+    write_energy(out, recording.energy);
 }
 
 void read_doubts(ByteReader& in, std::size_t bodies, Recording& recording) {
-    DescentCauses& causes = recording.descent_causes;
-    for (std::uint64_t* count : {&causes.chosen, &causes.too_many_substeps, &causes.not_finite})
-        *count = in.value<std::uint64_t>();
-    recording.last_volume_ratio = in.value<float>();
     for (std::size_t b = 0; b < bodies; ++b) {
         const auto flags = in.value<std::uint64_t>();
         const auto first_lost = in.value<std::uint64_t>();
-        Crush crush;
+        Inversion inversion;
         FlowedOut flowed;
-        for (std::uint64_t* number : {&crush.first, &crush.worst, &flowed.first, &flowed.most})
-            *number = in.value<std::uint64_t>();
-        crush.least = in.value<float>();
+        for (std::uint64_t* count : {&inversion.first, &inversion.last, &inversion.frames, &inversion.worst,
+                                     &inversion.cells, &flowed.first, &flowed.most})
+            *count = in.value<std::uint64_t>();
+        inversion.least = in.value<float>();
+        inversion.place = read_point(in);
         BodyDoubts& body = recording.doubts.emplace_back();
         if (flags & 1) body.first_lost = first_lost;
-        if (flags & 2) body.crush = crush;
+        if (flags & 2) body.inversion = inversion;
         if (flags & 4) body.flowed_out = flowed;
     }
+    FirstLoss loss;
+    const bool has_loss = in.value<std::uint64_t>() != 0;
+    for (std::uint64_t* count : {&loss.frame, &loss.body}) *count = in.value<std::uint64_t>();
+    loss.place = read_point(in);
+    if (has_loss && loss.body < bodies) recording.first_loss = loss;
+    recording.energy = read_energy(in);
+    recording.energy.body = std::min<std::uint64_t>(recording.energy.body, bodies - 1);
 }
 
 void write_poses(ByteWriter& out, const PoseSequence& poses) {

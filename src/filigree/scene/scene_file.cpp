@@ -1,5 +1,6 @@
 #include "filigree/scene/scene_file.h"
 
+#include "filigree/core/random.h"
 #include "filigree/io/file.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
@@ -21,6 +22,31 @@ namespace filigree {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Whether a name is what a pattern says, in which * stands for any letters.
+bool fits(std::string_view name, std::string_view pattern) {
+    const std::size_t star = pattern.find('*');
+    if (star == std::string_view::npos) return name == pattern;
+    if (!name.starts_with(pattern.substr(0, star))) return false;
+    for (std::size_t from = star; from <= name.size(); ++from)
+        if (fits(name.substr(from), pattern.substr(star + 1))) return true;
+    return false;
+}
+
+/// The k-th of a repeated body.
+SceneBody repeated(const SceneBody& body, const SceneRepeat& repeat, std::size_t k) {
+    const auto at = [&](std::uint64_t number) { return 2 * random_unit(repeat.seed, 8 * k + number) - 1; };
+    SceneBody one = body;
+    one.name = fmt::format("{}.{}", body.group, k + 1);
+    const std::array<double, 3> place = {double(k % repeat.count[0]), double(k / repeat.count[0] % repeat.count[1]),
+                                         double(k / repeat.count[0] / repeat.count[1])};
+    for (int axis = 0; axis < 3; ++axis)
+        one.aside[axis] = repeat.step[axis] * place[repeat.is_row ? 0 : axis] + repeat.jitter * at(unsigned(axis));
+    const Vec3d about(at(3), at(4), at(5));
+    if (repeat.turn > 0 && about.norm() > 0)
+        one.rotation = Eigen::AngleAxisd(repeat.turn * at(6), about.normalized()) * body.rotation;
+    return one;
+}
 
 /// A name that can be part of a file's name.
 std::string plain_name(const std::string& text) {
@@ -90,12 +116,16 @@ public:
         each("fracture", [&](const SceneTable& section) { read_fracture(section); });
         each("crack", [&](const SceneTable& section) { read_crack(section); });
         each("pin", [&](const SceneTable& section) {
-            scene_.pins.push_back({section.line(), body_of(section), section.region(), section.motion()});
-            if (scene_.bodies[scene_.pins.back().body].material.model == MaterialModel::rigid)
-                section.fail(section.line(), "a rigid body has no part that could be held; make it an [[obstacle]]");
+            for (const std::size_t body : bodies_of(section)) {
+                scene_.pins.push_back({section.line(), body, section.region(), section.motion()});
+                if (scene_.bodies[body].material.model == MaterialModel::rigid)
+                    section.fail(section.line(),
+                                 "a rigid body has no part that could be held; make it an [[obstacle]]");
+            }
         });
         each("force", [&](const SceneTable& section) {
-            scene_.forces.push_back({section.line(), body_of(section), section.region(), section.keyed("newtons")});
+            for (const std::size_t body : bodies_of(section))
+                scene_.forces.push_back({section.line(), body, section.region(), section.keyed("newtons")});
         });
         each("heat", [&](const SceneTable& section) {
             HeatSource source{{.radius = 0.1}, section.keyed("move"), section.keyed_number("power", 0)};
@@ -167,8 +197,6 @@ private:
         }
         step.mode = static_cast<StepMode>(in.word("mode", 0));
         in.set_whole("most_substeps", step.most_substeps);
-        in.set_whole("descent_substeps", step.descent_substeps);
-        in.set_whole("descent_iterations", step.descent_iterations);
         step.contacts_between_bodies = in.flag("contacts_between_bodies", true);
         step.contacts_within_bodies = in.flag("contacts_within_bodies", true);
         step.automatic_rigid = in.flag("automatic_rigid", true);
@@ -200,8 +228,8 @@ private:
         if (in.has("shape"))
             in.set("size", body.shape_options.size);
         else if (in.has("size"))
-            in.set("size", body.size.emplace());
-        if (body.size && in.has("scale")) in.fail("size", "give one of size and scale");
+            in.set("size", body.body.size.emplace());
+        if (body.body.size && in.has("scale")) in.fail("size", "give one of size and scale");
         in.set("length", body.shape_options.length);
         in.set("thickness", body.shape_options.thickness);
         if (in.has("driver")) in.set_whole("driver", body.driver.emplace());
@@ -216,14 +244,18 @@ private:
         in.set("spin", body.spin);
         body.spin *= kDegree;
         in.set("color", body.color);
+        body.may_sleep = in.flag("may_sleep", true);
         body.name = name_of(in, body);
-        scene_.bodies.push_back(std::move(body));
+        if (!in.has("repeat")) return scene_.bodies.push_back(std::move(body));
+        const SceneRepeat repeat = in.repeat("repeat");
+        body.group = body.name;
+        for (std::size_t k = 0; k < repeat.bodies(); ++k) scene_.bodies.push_back(repeated(body, repeat, k));
     }
 
     std::string name_of(const SceneTable& in, const SceneBody& body) const {
         const auto is_taken = [&](const std::string& name) {
             return std::any_of(scene_.bodies.begin(), scene_.bodies.end(),
-                               [&](const SceneBody& other) { return other.name == name; });
+                               [&](const SceneBody& other) { return other.name == name || other.group == name; });
         };
         if (in.has("name")) {
             const std::string name = in.text("name");
@@ -235,6 +267,10 @@ private:
         std::string name = base;
         for (int number = 2; is_taken(name); ++number) name = fmt::format("{}{}", base, number);
         return name;
+    }
+
+    static const NamedMaterial& material_called(std::string_view name) {
+        return *std::ranges::find(named_materials(), name, &NamedMaterial::name);
     }
 
     /// Refuses keys that do nothing for the body's model.
@@ -334,7 +370,17 @@ private:
         scene_.obstacles.push_back(std::move(obstacle));
     }
 
-    /// The body that a pin, force or hand names.
+    /// The bodies that a pin, force or fracture names: one, or all of a repeated one.
+    std::vector<std::size_t> bodies_of(const SceneTable& in) const {
+        std::vector<std::size_t> found;
+        const std::string name = in.text("body");
+        const bool is_one_group = !in.has("body") && !scene_.bodies.front().group.empty() &&
+                                  scene_.bodies.front().group == scene_.bodies.back().group;
+        for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
+            if (is_one_group || (!name.empty() && scene_.bodies[b].group == name)) found.push_back(b);
+        return found.empty() ? std::vector<std::size_t>{body_of(in)} : found;
+    }
+    /// The body that a hand or crack names.
     std::size_t body_of(const SceneTable& in) const {
         if (!in.has("body")) {
             if (scene_.bodies.size() > 1)
@@ -342,21 +388,25 @@ private:
             return 0;
         }
         std::vector<std::string_view> names;
-        for (const SceneBody& body : scene_.bodies) names.push_back(body.name);
+        for (const SceneBody& body : scene_.bodies)
+            if (body.group.empty() || names.empty() || names.back() != body.group)
+                names.push_back(body.group.empty() ? body.name : body.group);
         const std::string name = in.text("body");
-        const auto found = std::find(names.begin(), names.end(), name);
-        if (found == names.end())
-            in.fail("body", fmt::format("there is no body '{}'; there are {}", name, fmt::join(names, ", ")));
-        return std::size_t(found - names.begin());
+        for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
+            if (scene_.bodies[b].name == name) return b;
+        if (std::ranges::count(scene_.bodies, name, &SceneBody::group) > 0)
+            in.fail("body", fmt::format("'{0}' is repeated; name one of them, such as '{0}.1'", name));
+        in.fail("body", fmt::format("there is no body '{}'; there are {}", name, fmt::join(names, ", ")));
     }
 
-    /// Numbers of the bodies of this name, or of this material.
+    /// Numbers of the bodies of this name or pattern, of a repeated one, or of this material.
     std::vector<std::size_t> bodies_called(const SceneTable& in, std::string_view key) const {
         if (!in.has(key)) in.fail(in.line(), "[[pair]] needs first and second: names of bodies or materials");
         const std::string name = in.text(key);
         std::vector<std::size_t> found;
         for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
-            if (scene_.bodies[b].name == name) return {b};
+            if (fits(scene_.bodies[b].name, name) || scene_.bodies[b].group == name) found.push_back(b);
+        if (!found.empty()) return found;
         for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
             if (scene_.bodies[b].material_name == name) found.push_back(b);
         if (found.empty()) in.fail(key, "no body is called '" + name + "', nor made of it");
@@ -371,14 +421,20 @@ private:
     }
 
     void read_fracture(const SceneTable& in) {
+        for (const std::size_t body : bodies_of(in)) read_fracture(in, body);
+    }
+    void read_fracture(const SceneTable& in, std::size_t body) {
         SceneFracture fracture;
         fracture.line = in.line();
-        fracture.body = body_of(in);
+        fracture.body = body;
+        const NamedMaterial& named = material_called(scene_.bodies[body].material_name);
         const Material& material = scene_.bodies[fracture.body].material;
         if (material.model != MaterialModel::fem)
-            in.fail(in.line(), "only bodies of model = \"fem\" break, and '" + scene_.bodies[fracture.body].name +
-                                   "' is of another; add model = \"fem\" and young_modulus = 2e7 to its [[body]] "
-                                   "(stiffer takes longer; with fem, clay dents and tears as well)");
+            in.fail(in.line(),
+                    "only bodies of model = \"fem\" break, and '" + scene_.bodies[fracture.body].name +
+                        "' is of another; give its [[body]] a material that breaks (brittle-stone, glass, plaster), or "
+                        "add model = \"fem\" and young_modulus = 2e7 (stiffer takes longer; with fem, clay dents and "
+                        "tears as well)");
         for (const SceneFracture& other : scene_.fractures)
             if (other.body == fracture.body) in.fail(in.line(), "a body has one [[fracture]] at most");
         in.set_whole("pieces", fracture.pattern.pieces);
@@ -395,6 +451,9 @@ private:
         fracture.material.seed = 1;
         in.set_whole("seed", fracture.material.seed);
         fracture.material.strength = material.is_plastic() ? 3 * material.yield_stress : 0.01 * material.young_modulus;
+        if (named.strength > 0) // it breaks at the same strain where another stiffness is given
+            fracture.material.strength = named.strength * material.young_modulus / named.material.young_modulus;
+        if (named.energy > 0) fracture.energy = named.energy;
         in.set("strength", fracture.material.strength);
         if (in.has("plastic_opening")) {
             if (!material.is_plastic())

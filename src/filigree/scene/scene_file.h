@@ -7,6 +7,7 @@
 #include "filigree/mesh/shapes.h"
 #include "filigree/physics/simulation.h"
 
+#include <array>
 #include <optional>
 #include <span>
 #include <string>
@@ -28,20 +29,34 @@ struct SceneMotion {
     bool moves() const { return !move.times.empty() || !angle.times.empty(); }
 };
 
+/// Many bodies for one [[body]].
+struct SceneRepeat {
+    std::array<unsigned, 3> count = {1, 1, 1}; ///< along x, y and z; along `step` where it is one number
+    bool is_row = false;                       ///< it is
+    Vec3d step = Vec3d::Zero();                ///< m
+    double jitter = 0;                         ///< m, most along each axis, to either side
+    double turn = 0;                           ///< radians at most, about any axis
+    std::uint64_t seed = 1;                    ///< of both
+
+    std::size_t bodies() const { return std::size_t{count[0]} * count[1] * count[2]; }
+};
+
 struct SceneBody {
     unsigned line = 0; ///< where it begins in the file, for messages
     std::string name;
-    std::string mesh; ///< file, as found from here; or
+    std::string group; ///< of repeated bodies: what each name begins with, before ".1" and so on; else ""
+    std::string mesh;  ///< file, as found from here; or
     std::string shape;
     ShapeOptions shape_options;
     std::optional<std::size_t> driver = {}; ///< vertices; unset: as fine as the particles, see body_driver_options
-    BodyOptions body;                       ///< with the scale, metres a model unit; or
-    std::optional<double> size = {};        ///< m, the longest side of the mesh
+    BodyOptions body;                       ///< with the scale, metres a model unit, or the size
     Material material;
     std::string material_name;        ///< that it began as
     std::optional<Vec3d> centre = {}; ///< m; unset: where the mesh's own coordinates say
+    Vec3d aside = Vec3d::Zero();      ///< m: from there, of a repeated one
     Eigen::AngleAxisd rotation = Eigen::AngleAxisd::Identity();
     Vec3d velocity = Vec3d::Zero(), spin = Vec3d::Zero(); ///< m/s, rad/s
+    bool may_sleep = true;
     std::optional<Vec3f> color = {};
 };
 

@@ -41,15 +41,13 @@ constexpr KeyRule kKeys[] = {
     from(1, 1e6, "simulation", "frames", whole, "", "120", "frames to compute; the start is one more in the output"),
     above(0, 1e6, "simulation", "duration", number, "s", "", "or how long to compute"),
     from(10, 1e4, "simulation", "frames_per_second", number, "1/s", "60", "of the output"),
-    one_of("auto explicit descent", "simulation", "mode", "auto",
-           "how time is stepped: explicit where most_substeps are enough, else descent; or always one of them"),
-    from(1, 1e5, "simulation", "most_substeps", whole, "", "256", "a frame, explicit"),
-    from(1, 1000, "simulation", "descent_substeps", whole, "", "4", "a frame, descent"),
-    from(1, 1000, "simulation", "descent_iterations", whole, "", "8", "a substep, descent"),
+    one_of("auto explicit", "simulation", "mode", "auto",
+           "auto: bodies that are too stiff for most_substeps become rigid; explicit: they stay elastic"),
+    from(1, 1e5, "simulation", "most_substeps", whole, "", "500", "a frame, that a body may need to stay elastic"),
     plain("simulation", "contacts_between_bodies", flag, "", "true", "whether bodies touch each other"),
     plain("simulation", "contacts_within_bodies", flag, "", "true", "whether a body touches itself"),
     plain("simulation", "automatic_rigid", flag, "", "true",
-          "whether bodies of fewer than 8 cells, or too stiff for explicit steps by far, are moved as rigid"),
+          "whether bodies of fewer than 8 cells, or that need more than most_substeps, become rigid"),
 
     plain("world", "gravity", vector, "m/s^2", "[0, -9.81, 0]", "acceleration of everything"),
     plain("world", "wind", keyed, "m/s", "[0, 0, 0]", "velocity of the air"),
@@ -109,6 +107,11 @@ constexpr KeyRule kKeys[] = {
     plain("body", "rotate", rotation, "degrees", "", "about that centre: `{ axis = [0, 1, 0], degrees = 30 }`"),
     plain("body", "velocity", vector, "m/s", "[0, 0, 0]", "at the start"),
     plain("body", "spin", vector, "degrees/s", "[0, 0, 0]", "at the start, about its centre of mass: axis times speed"),
+    plain("body", "repeat", repeat, "m, degrees", "",
+          "many of it, `NAME.1` and so on: `{ count = [5, 8, 1], step = [0.3, 0.2, 0] }`, or one count in a row along "
+          "step; `jitter` moves each by up to so far along each axis, `turn` turns it by up to so many degrees about "
+          "any axis, both by `seed`"),
+    plain("body", "may_sleep", flag, "", "true", "rigid: whether it costs nothing while it lies still on something"),
     plain("body", "color", color, "", "by its number", "in pictures, `\"#rrggbb\"`"),
 
     one_of("ground ball box mesh", "obstacle", "shape", "", "must be there"),
@@ -141,12 +144,15 @@ constexpr KeyRule kKeys[] = {
     from(-1e12, 1e12, "heat", "power", keyed_number, "W", "0",
          "that the matter in it takes up, shared out by mass; below 0 it cools"),
 
-    plain("pair", "first", text, "", "", "name of a body, or of a material: all bodies of it; must be there"),
+    plain("pair", "first", text, "", "",
+          "name of a body, of a repeated one, or of a material: all bodies of it; `*` stands for any letters; must be "
+          "there"),
     plain("pair", "second", text, "", "", "the same of what it touches; of one body with itself, its name again"),
     from(0, 100, "pair", "friction", number, "", "the world's", "Coulomb's coefficient where these touch"),
     from(0, 1, "pair", "restitution", number, "", "the world's", "where these touch"),
 
-    plain("fracture", "body", text, "", "the only one", "name of the body that breaks; it is of model fem"),
+    plain("fracture", "body", text, "", "the only one",
+          "name of the body that breaks, or of a repeated one; it is of model fem"),
     from(2, 100'000, "fracture", "pieces", whole, "", "20", "that it may break into"),
     one_of(
         "even impact slabs radial grains", "fracture", "pattern", "even",
@@ -161,13 +167,14 @@ constexpr KeyRule kKeys[] = {
     from(1, 100, "fracture", "stretch", number, "", "6", "slabs: how many times longer"),
     from(0, 1, "fracture", "roughness", number, "", "0.5", "of cracks; 0 is planes"),
     from(0, 1e9, "fracture", "seed", whole, "", "1", "of the pattern and the scatter"),
-    above(0, 1e12, "fracture", "strength", number, "Pa", "0.01 young_modulus; of what yields 3 yield_stress",
+    above(0, 1e12, "fracture", "strength", number, "Pa",
+          "by the material, else 0.01 young_modulus; of what yields 3 yield_stress",
           "the stress at which a crack begins"),
     above(0, 1e6, "fracture", "plastic_opening", number, "m", "any",
           "of what yields: how far a layer a cell thick may stretch for good before it tears"),
     from(0, 1, "fracture", "scatter", number, "", "0", "of the strengths of cracks: their standard deviation, a share"),
-    above(0, 1e12, "fracture", "energy", number, "J/m^2", "strength^2 diagonal / (50 young_modulus)",
-          "that a crack costs by its area"),
+    above(0, 1e12, "fracture", "energy", number, "J/m^2",
+          "by the material, else strength^2 diagonal / (50 young_modulus)", "that a crack costs by its area"),
     plain("fracture", "keep_closed", flag, "", "false", "also write the inner faces of cracks that never opened"),
 
     plain("crack", "body", text, "", "the only one", "name of a body with a [[fracture]]"),
@@ -177,7 +184,7 @@ constexpr KeyRule kKeys[] = {
     plain("crack", "ball", ball, "m", "everywhere", "in a ball; or"),
     plain("crack", "vertices", ids, "", "everywhere", "near vertices of its mesh"),
 
-    plain("pin", "body", text, "", "the only one", "name of the body whose particles are held"),
+    plain("pin", "body", text, "", "the only one", "name of the body whose particles are held, or of a repeated one"),
     plain("pin", "box", box, "m", "", "those in a box at the start: `{ min = [x, y, z], max = [x, y, z] }`; or"),
     plain("pin", "ball", ball, "m", "", "in a ball: `{ centre = [x, y, z], radius = r }`; or"),
     plain("pin", "vertices", ids, "", "", "near vertices of its mesh, counted from 0"),
@@ -185,7 +192,7 @@ constexpr KeyRule kKeys[] = {
     plain("pin", "turn", keyed, "degrees", "[0, 0, 0]", "axis times angle, before they move"),
     plain("pin", "pivot", vector, "m", "their middle", "what they turn about"),
 
-    plain("force", "body", text, "", "the only one", "name of the body that is pushed"),
+    plain("force", "body", text, "", "the only one", "name of the body that is pushed, or of a repeated one"),
     plain("force", "box", box, "m", "the whole body", "on what is in a box at the start; or"),
     plain("force", "ball", ball, "m", "the whole body", "in a ball; or"),
     plain("force", "vertices", ids, "", "the whole body", "near vertices of its mesh"),
@@ -312,6 +319,8 @@ std::string type_text(KeyType type) {
         return "list of numbers from 0";
     case rotation:
         return "axis and degrees";
+    case repeat:
+        return "table";
     case pixels:
         return "two whole numbers";
     }
@@ -342,17 +351,18 @@ std::string scene_manual() {
     }
     manual +=
         "\n### Materials\n\n| name | model | density | young_modulus | poisson_ratio | damping | internal_damping | "
-        "yield_stress | creep_time | melting_from, melting_to | viscosity | |\n"
-        "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+        "yield_stress | creep_time | melting_from, melting_to | viscosity | strength, energy | |\n"
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
     constexpr std::array<std::string_view, 5> kModels = {"fem", "springs", "meshfree", "rigid", "mpm"};
     for (const NamedMaterial& named : named_materials()) {
         const Material& m = named.material;
         manual +=
-            fmt::format("| `{}` | {} | {} | {:.0e} | {} | {} | {} | {} | {} | {} | {} | {} |\n", named.name,
+            fmt::format("| `{}` | {} | {} | {:.0e} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", named.name,
                         kModels[std::size_t(m.model)], m.density, m.young_modulus, m.poisson_ratio, m.damping,
                         m.internal_damping, or_never(m.yield_stress), m.is_plastic() ? or_never(m.creep_time) : "",
                         m.melts() ? fmt::format("{}, {}", m.melting_from, m.melting_to) : "",
-                        m.melts() ? fmt::format("{}", m.viscosity) : "", named.text);
+                        m.melts() ? fmt::format("{}", m.viscosity) : "",
+                        named.strength > 0 ? fmt::format("{:.0e}, {}", named.strength, named.energy) : "", named.text);
     }
     return manual.substr(1);
 }

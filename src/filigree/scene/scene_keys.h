@@ -22,6 +22,7 @@ enum class KeyType {
     ball,
     ids,
     rotation,
+    repeat,
     pixels
 };
 

@@ -16,7 +16,10 @@ namespace filigree {
 
 namespace {
 
-constexpr float kCrushed = 0.1f; ///< of a cell's volume, below which the user is told
+/// Frames in each of which the energy is looked at, and then every so many: it costs a twenty-fifth of a frame.
+constexpr std::uint64_t kEveryFrameUntil = 8, kEnergyFrames = 4;
+/// Elastic energy of a strain of 1e-4, as a part of the stiffness: rounding.
+constexpr double kEnergyNoise = 1e-8;
 
 double percentile_95(std::vector<float>& values) {
     if (values.empty()) return 0;
@@ -24,9 +27,6 @@ double percentile_95(std::vector<float>& values) {
     std::nth_element(values.begin(), place, values.end());
     return *place;
 }
-
-/// A part of a volume in words; below 0: inside out.
-std::string volume_text(float ratio) { return ratio > 0 ? fmt::format("{:.2g} %", 100 * ratio) : "less than none"; }
 
 /// A frame's distances of the restored mesh from the one that the particles carry, of vertices that are not about to be
 /// the particles' surface; diagonal: of the body, m.
@@ -76,6 +76,7 @@ Result<SceneRun> SceneRun::create(const SceneFile& scene, const ReadyScene& read
     SceneRun run(scene, ready, std::move(*simulation), context.threads());
     if (const Status followed = run.follow(checks); !followed) return followed.error();
     run.recording_.totals.start = run.energy();
+    if (left_alone_from(scene) <= 0) run.recording_.energy.begin(run.recording_.totals.start);
     for (std::size_t b = 0; b < ready.bodies.size(); ++b)
         if (const Status recorded = run.record_body(b); !recorded) return recorded.error();
     run.times_ = {}; // the start is no frame
@@ -124,9 +125,7 @@ Status SceneRun::advance_to(std::uint64_t last, const RunContext& context) {
         if (!report) return report.error();
         recording_.totals.add(*report);
         times_.add(*report);
-        recording_.descent_causes.add(*report);
-        recording_.last_volume_ratio = report->least_volume_ratio;
-        note_crush(*report);
+        note_doubts(*report);
         note_flow(*report);
         for (std::size_t b = 0; b < followers_.size(); ++b)
             if (const Status recorded = record_body(b); !recorded) return recorded;
@@ -174,13 +173,60 @@ void SceneRun::hold_lost_of(std::size_t b) {
     if (held > 0 && !first) first = frame();
 }
 
-void SceneRun::note_crush(const FrameReport& report) {
-    if (!(report.least_volume_ratio < kCrushed)) return;
-    std::optional<Crush>& crush = recording_.doubts[report.most_crushed].crush;
-    if (!crush) crush = Crush{.first = frame()};
-    if (!(report.least_volume_ratio < crush->least)) return;
-    crush->least = report.least_volume_ratio;
-    crush->worst = frame();
+void SceneRun::note_doubts(const FrameReport& report) {
+    if (report.clamped_particles > 0 && !recording_.first_loss)
+        recording_.first_loss = {frame(), report.clamped_body, report.clamped_at};
+    if (report.least_volume_ratio <= 0)
+        for (std::size_t b = 0; b < followers_.size(); ++b) {
+            const InvertedCells cells = simulation_.inverted(b);
+            if (cells.count == 0) continue;
+            if (!recording_.doubts[b].inversion) recording_.doubts[b].inversion.emplace();
+            recording_.doubts[b].inversion->add(frame(), cells);
+        }
+    watch_energy();
+}
+
+/// Whether there is more energy than there was when all was last left to itself.
+void SceneRun::watch_energy() {
+    if (frame() > kEveryFrameUntil && frame() % kEnergyFrames != 0) return;
+    EnergyWatch& watch = recording_.energy;
+    if (!watch.has_begun) {
+        if (simulation_.time() >= left_alone_from(*scene_)) watch.begin(energy());
+        return;
+    }
+    double least = 0; // J, below which energies are rounding
+    for (const ReadyBody& body : ready_->bodies)
+        least += kEnergyNoise * body.body->material.young_modulus * body.report.cells.volume;
+    const double grown = watch.excess(energy(), allowed_growth(*scene_), least);
+    if (!(grown > watch.grown)) return;
+    if (watch.first == 0) watch.first = frame();
+    watch.worst = frame();
+    watch.grown = grown;
+    watch.share = grown / std::max(watch.moving + watch.potential - watch.least_potential, least);
+    watch.body = fastest_body();
+    watch.place = middle_of(watch.body);
+}
+
+std::size_t SceneRun::fastest_body() const {
+    std::size_t fastest = 0;
+    double most = -1;
+    for (std::size_t b = 0; b < followers_.size(); ++b) {
+        const Vectors& velocities = simulation_.velocities(b);
+        const std::vector<float>& mass = simulation_.body(b).mass;
+        double twice = 0;
+        for (std::size_t i = 0; i < velocities.size(); ++i) twice += double(mass[i] * velocities[i].squaredNorm());
+        if (twice <= most) continue;
+        fastest = b;
+        most = twice;
+    }
+    return fastest;
+}
+
+Vec3f SceneRun::middle_of(std::size_t body) const {
+    Vec3d middle = Vec3d::Zero();
+    const Vectors& positions = simulation_.positions(body);
+    for (std::size_t i = 0; i < positions.size(); ++i) middle += positions[i].cast<double>() / double(positions.size());
+    return middle.cast<float>();
 }
 
 void SceneRun::note_flow(const FrameReport& report) {
@@ -211,86 +257,103 @@ Result<Mesh> SceneRun::mesh(std::size_t body, std::size_t frame, const RunContex
 
 std::vector<std::string> SceneRun::warnings() const {
     std::vector<std::string> sentences;
+    for (const StartOverlap& overlap : simulation_.start_overlaps()) {
+        const SceneObstacle& obstacle = scene_->obstacles[overlap.obstacle];
+        const std::string name = obstacle.mesh.empty() ? obstacle.shape : obstacle.mesh;
+        sentences.push_back(overlap.sentence(fmt::format("body '{}'", ready_->bodies[overlap.body].name),
+                                             fmt::format("obstacle '{}' (line {})", name, obstacle.line)));
+    }
+    const auto add = [&](const std::string& sentence) {
+        if (!sentence.empty()) sentences.push_back(sentence);
+    };
     for (std::size_t b = 0; b < followers_.size(); ++b)
         if (const std::optional<std::uint64_t> first = recording_.doubts[b].first_lost)
             sentences.push_back(fmt::format("body '{}': the motion broke down at some of its surface, first in frame "
                                             "{}; parts of the driver were held where they were",
                                             ready_->bodies[b].name, *first));
-    if (const std::uint64_t clamped = recording_.totals.clamped_particles)
-        sentences.push_back(fmt::format("{} motions of particles were not finite or had to be limited: the motion is "
-                                        "not to be trusted",
-                                        with_commas(clamped)));
+    add(loss_warning());
     for (std::size_t b = 0; b < followers_.size(); ++b) {
-        const std::string& name = ready_->bodies[b].name;
-        if (const std::string& reason = simulation_.why_rigid(b); !reason.empty())
+        const std::string& reason = simulation_.why_rigid(b);
+        if (!reason.empty() && ready_->bodies[b].body->cells.cells.size() >= kFewestElasticCells)
             sentences.push_back(fmt::format("body '{}' is moved as a rigid body: {}; automatic_rigid = false keeps it "
                                             "elastic",
-                                            name, reason));
-        if (const std::optional<Crush>& crush = recording_.doubts[b].crush)
-            sentences.push_back(fmt::format("body '{}': cells were crushed to {} of their volume in frame {}, first "
-                                            "below a tenth in frame {}: what follows may be wrong",
-                                            name, volume_text(crush->least), crush->worst, crush->first));
-        if (const std::optional<FlowedOut>& flowed = recording_.doubts[b].flowed_out)
-            sentences.push_back(
-                fmt::format("body '{}': {} of its cells or particles flowed to seven times their length, "
-                            "first in frame {}, and are elastic from there on; model = \"mpm\" is for "
-                            "matter that flows so far",
-                            name, with_commas(flowed->most), flowed->first));
+                                            ready_->bodies[b].name, reason));
+        add(inversion_warning(b));
+        add(flow_warning(b));
     }
-    if (recording_.last_volume_ratio <= 0)
-        sentences.push_back("some cells are inside out at the end: the bodies were pressed or pulled too hard");
-    if (const std::optional<std::string> energy = energy_warning()) sentences.push_back(*energy);
-    if (const std::optional<std::string> descent = descent_warning()) sentences.push_back(*descent);
+    add(energy_warning());
     return sentences;
 }
 
+std::vector<std::string> SceneRun::notes() const {
+    std::vector<std::string> sentences;
+    for (std::size_t b = 0; b < followers_.size(); ++b)
+        if (const std::string& reason = simulation_.why_rigid(b);
+            !reason.empty() && ready_->bodies[b].body->cells.cells.size() < kFewestElasticCells)
+            sentences.push_back(fmt::format("body '{}' is moved as a rigid body: {}", ready_->bodies[b].name, reason));
+    return sentences;
+}
+
+std::string SceneRun::place_text(const Vec3f& place) const {
+    const Vec3d at = place.cast<double>() + ready_->origin;
+    return fmt::format("({:.3g}, {:.3g}, {:.3g}) m", at.x(), at.y(), at.z());
+}
+
+std::string SceneRun::loss_warning() const {
+    const std::optional<FirstLoss>& first = recording_.first_loss;
+    if (!first) return "";
+    return fmt::format("{} motions of particles were not finite or had to be limited, first in frame {}, body '{}', "
+                       "near {}: make the body smaller (scale, size), stiffer (young_modulus) or slower",
+                       with_commas(recording_.totals.clamped_particles), first->frame, ready_->bodies[first->body].name,
+                       place_text(first->place));
+}
+
+std::string SceneRun::inversion_warning(std::size_t b) const {
+    const std::optional<Inversion>& inversion = recording_.doubts[b].inversion;
+    if (!inversion) return "";
+    const ReadyBody& body = ready_->bodies[b];
+    const std::string frames = inversion->frames == 1 ? fmt::format("frame {}", inversion->first)
+                                                      : fmt::format("{} of the frames {} to {}", inversion->frames,
+                                                                    inversion->first, inversion->last);
+    return fmt::format("body '{}': cells were inside out at the end of {}; in frame {} {} of {}, the worst near {}: "
+                       "make the body stiffer (young_modulus; it has {:.0e}), smaller (scale, size) or slower, or pull "
+                       "and press it less",
+                       body.name, frames, inversion->worst, with_commas(inversion->cells),
+                       with_commas(body.report.cells.cells), place_text(inversion->place),
+                       body.body->material.young_modulus);
+}
+
+std::string SceneRun::flow_warning(std::size_t b) const {
+    const std::optional<FlowedOut>& flowed = recording_.doubts[b].flowed_out;
+    if (!flowed) return "";
+    return fmt::format("body '{}': {} of its cells or particles flowed to seven times their length, first in frame {}, "
+                       "and are elastic from there on; model = \"mpm\" is for matter that flows so far",
+                       ready_->bodies[b].name, with_commas(flowed->most), flowed->first);
+}
+
+std::string SceneRun::energy_warning() const {
+    const EnergyWatch& watch = recording_.energy;
+    if (!(watch.grown > 0)) return "";
+    const std::string part = watch.share < 10 ? fmt::format(", {:.2g} % of what there was", 100 * watch.share) : "";
+    return fmt::format("the energy grew by {:.3g} J{}, first in frame {} and most in frame "
+                       "{}, and nothing did that work; body '{}', near {}, moves most: move apart what starts inside "
+                       "something, or make it slower or softer (young_modulus)",
+                       watch.grown, part, watch.first, watch.worst, ready_->bodies[watch.body].name,
+                       place_text(watch.place));
+}
+
 std::optional<std::string> SceneRun::broke_down() const {
-    const bool lost =
-        std::ranges::any_of(recording_.doubts, [](const BodyDoubts& body) { return body.first_lost.has_value(); });
-    if (recording_.totals.clamped_particles == 0 && !lost) return std::nullopt;
-    return scene_->path + ": the motion broke down and is not to be trusted: bodies are too soft for their size or "
-                          "speed. Make them smaller (scale, size), stiffer (young_modulus), slower, or give them "
-                          "damping.";
-}
-
-/// Whether nothing in the scene does work on the bodies but gravity.
-bool SceneRun::is_left_alone() const {
-    return scene_->pins.empty() && scene_->hands.empty() && scene_->forces.empty() && scene_->wind.times.empty() &&
-           scene_->wind.constant.isZero() &&
-           std::none_of(scene_->obstacles.begin(), scene_->obstacles.end(),
-                        [](const SceneObstacle& obstacle) { return obstacle.motion.moves(); });
-}
-
-std::optional<std::string> SceneRun::energy_warning() const {
-    constexpr double kGrowth = 0.05, kNoise = 1e-8; // the latter: elastic energy of a strain of 1e-4
-    if (frame() == 0 || !is_left_alone()) return std::nullopt;
-    const Energy &start = recording_.totals.start, end = energy();
-    double least = 0; // J, below which energies are rounding
-    for (const ReadyBody& body : ready_->bodies)
-        least += kNoise * body.body->material.young_modulus * body.report.cells.volume;
-    // The potential has no zero of its own: what counts is how much of it came or went.
-    const double had = start.kinetic + start.elastic + std::abs(end.potential - start.potential);
-    const double grown = end.total() - start.total();
-    if (grown <= kGrowth * had + least) return std::nullopt;
-    return fmt::format("the energy grew by {:.3g} J although nothing did work: bodies start inside something, or the "
-                       "motion is not to be trusted",
-                       grown);
-}
-
-/// Descent has a damping of its own, which takes the place of what the scene asks for.
-std::optional<std::string> SceneRun::descent_warning() const {
-    const bool is_deadened = std::any_of(scene_->bodies.begin(), scene_->bodies.end(),
-                                         [](const SceneBody& body) { return body.material.internal_damping > 0; });
-    const bool is_springy = std::any_of(scene_->obstacles.begin(), scene_->obstacles.end(),
-                                        [](const SceneObstacle& obstacle) { return obstacle.sets_restitution; });
-    const std::uint64_t frames = recording_.totals.descent_frames;
-    if (frames == 0 || !(is_deadened || is_springy)) return std::nullopt;
-    const char* replaced = !is_springy    ? "internal_damping"
-                           : !is_deadened ? "restitution"
-                                          : "internal_damping and restitution";
-    return fmt::format("{} frames were computed by descent, whose own damping takes the place of {}; mode = "
-                       "\"explicit\" heeds {}",
-                       with_commas(frames), replaced, is_deadened && is_springy ? "them" : "it");
+    std::vector<std::string> what;
+    const auto any = [&](const auto& has) { return std::ranges::any_of(recording_.doubts, has); };
+    if (recording_.totals.clamped_particles > 0 ||
+        any([](const BodyDoubts& body) { return body.first_lost.has_value(); }))
+        what.emplace_back("the motion broke down");
+    if (any([](const BodyDoubts& body) { return body.inversion.has_value(); }))
+        what.emplace_back("cells were inside out");
+    if (recording_.energy.grown > 0) what.emplace_back("energy came from nowhere");
+    if (what.empty()) return std::nullopt;
+    return fmt::format("{}: {}, so the result is not to be trusted; the warnings say where, and what to change.",
+                       scene_->path, fmt::join(what, ", "));
 }
 
 } // namespace filigree

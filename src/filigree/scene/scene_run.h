@@ -30,15 +30,18 @@ public:
     std::uint64_t frame() const { return recording_.totals.frames; }
     const Recording& recording() const { return recording_; }
     const RunTimes& times() const { return times_; }
-    const DescentCauses& descent_causes() const { return recording_.descent_causes; }
     FractureReport fracture(std::size_t body) const { return simulation_.fracture(body); }
     Energy energy() const { return simulation_.energy(always_); }
     /// The body's mesh in one of the recorded poses, at the scene's origin. Errors: as of Restorer::mesh.
     Result<Mesh> mesh(std::size_t body, std::size_t frame, const RunContext& context) const;
     /// What makes the motion so far doubtful, or other than the scene says: sentences.
     std::vector<std::string> warnings() const;
-    /// A sentence where particles or the driver went nowhere sensible, so that what is recorded is not to be trusted.
+    /// A sentence where what is recorded is not to be trusted: motions were not finite or the driver went nowhere
+    /// sensible, cells of fem or springs were inside out at the end of a frame, or energy came from nowhere. warnings()
+    /// then say how much, where, and what to change.
     std::optional<std::string> broke_down() const;
+    /// What the user may want to know and need not act on: sentences.
+    std::vector<std::string> notes() const;
 
 private:
     /// What goes along with a body.
@@ -54,11 +57,16 @@ private:
     Status record_body(std::size_t body);
     void hold_lost_of(std::size_t body);
     void check_body(std::size_t body);
-    void note_crush(const FrameReport& report);
+    void note_doubts(const FrameReport& report);
     void note_flow(const FrameReport& report);
-    bool is_left_alone() const;
-    std::optional<std::string> energy_warning() const;
-    std::optional<std::string> descent_warning() const;
+    void watch_energy();
+    std::size_t fastest_body() const;
+    Vec3f middle_of(std::size_t body) const;
+    std::string place_text(const Vec3f& place) const;
+    std::string inversion_warning(std::size_t body) const;
+    std::string flow_warning(std::size_t body) const;
+    std::string loss_warning() const;
+    std::string energy_warning() const;
 
     const SceneFile* scene_;
     const ReadyScene* ready_;

@@ -220,6 +220,44 @@ Eigen::AngleAxisd SceneTable::rotation(std::string_view key) const {
                              axis.normalized());
 }
 
+SceneRepeat SceneTable::repeat(std::string_view key) const {
+    constexpr std::array<std::string_view, 5> kParts = {"count", "step", "jitter", "turn", "seed"};
+    constexpr double kMost = 10'000;
+    const toml::node& node = *table_.get(key);
+    const toml::table* table = node.as_table();
+    if (!table || !table->contains("count"))
+        wrong(node, key, "a table such as { count = [5, 8, 1], step = [0.3, 0.2, 0.3] }");
+    for (const auto& [part, value] : *table)
+        if (std::ranges::find(kParts, part.str()) == kParts.end())
+            fail(key, fmt::format("unknown key '{}' in {}{}", part.str(), key, suggestion(part.str(), kParts)));
+    const auto whole = [&](const toml::node& value, const char* what, double least, double most) {
+        const auto number = value.value_exact<std::int64_t>();
+        if (!number || double(*number) < least || double(*number) > most)
+            wrong(value, fmt::format("{}.{}", key, what), fmt::format("a whole number, {:g} to {:g}", least, most));
+        return *number;
+    };
+    SceneRepeat repeat;
+    const toml::node& count = *table->get("count");
+    const toml::array* counts = count.as_array();
+    if (counts && counts->size() != 3) wrong(count, "repeat.count", "one whole number or three");
+    repeat.is_row = !counts;
+    for (std::size_t axis = 0; axis < (counts ? 3 : 1); ++axis)
+        repeat.count[axis] = unsigned(whole(counts ? *counts->get(axis) : count, "count", 1, kMost));
+    if (double(repeat.bodies()) > kMost)
+        fail(key, fmt::format("these are {} bodies, and {:g} are the most", repeat.bodies(), kMost));
+    if (const toml::node* step = table->get("step")) repeat.step = vector_of(*step, "repeat.step");
+    const auto amount = [&](const char* what) {
+        const toml::node* value = table->get(what);
+        const double number = value ? finite_of(*value, fmt::format("{}.{}", key, what), "a number, 0 and up") : 0;
+        if (number < 0) wrong(*value, fmt::format("{}.{}", key, what), "a number, 0 and up");
+        return number;
+    };
+    repeat.jitter = amount("jitter");
+    repeat.turn = kDegree * amount("turn");
+    if (const toml::node* seed = table->get("seed")) repeat.seed = std::uint64_t(whole(*seed, "seed", 0, 1e9));
+    return repeat;
+}
+
 std::pair<unsigned, unsigned> SceneTable::pixels(std::string_view key) const {
     const toml::node& node = *table_.get(key);
     const toml::array* list = node.as_array();

@@ -56,6 +56,7 @@ public:
     std::vector<Index> ids(std::string_view key) const;
     SceneRegion region() const;
     Eigen::AngleAxisd rotation(std::string_view key) const;
+    SceneRepeat repeat(std::string_view key) const;
     std::pair<unsigned, unsigned> pixels(std::string_view key) const;
     /// A file's name, seen from the scene's folder; it has to be there.
     std::string file(std::string_view key) const;

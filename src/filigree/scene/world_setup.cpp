@@ -6,7 +6,8 @@
 #include "filigree/io/model_file.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/triangulate.h"
-#include "filigree/scene/own_weight.h"
+#include "filigree/physics/grid_limits.h"
+#include "filigree/physics/own_weight.h"
 #include "filigree/scene/particles_near.h"
 
 #include <algorithm>
@@ -74,7 +75,7 @@ public:
             result_.world.forces.push_back(
                 {force.body, particles_of(force.body, force.region, force.line), force.newtons});
         for (const SceneHand& hand : scene_.hands) add_hand(hand);
-        warn_of_models_that_do_not_meet();
+        warn_of_what_mpm_does_not_feel();
         result_.world.gravity = scene_.gravity;
         result_.world.wind = scene_.wind;
         result_.world.air_density = scene_.air_density;
@@ -95,11 +96,13 @@ public:
 private:
     void warn(std::string sentence) { result_.warnings.push_back(std::move(sentence)); }
 
-    void warn_of_models_that_do_not_meet() {
-        std::size_t on_grid = 0;
-        for (const SceneBody& body : scene_.bodies) on_grid += body.material.model == MaterialModel::mpm;
-        if (on_grid > 0 && on_grid < scene_.bodies.size())
-            warn("bodies of the model mpm touch obstacles and each other, and pass through bodies of other models");
+    void warn_of_what_mpm_does_not_feel() {
+        if (std::string sentence = why_models_do_not_meet(result_.actors); !sentence.empty()) warn(std::move(sentence));
+        for (const SlenderObstacle& slender : find_slender_obstacles(result_.world, result_.actors)) {
+            const SceneObstacle& obstacle = scene_.obstacles[slender.obstacle];
+            const std::string& name = obstacle.mesh.empty() ? obstacle.shape : obstacle.mesh;
+            warn(slender.sentence(fmt::format("obstacle '{}' (line {})", name, obstacle.line)));
+        }
     }
 
     Mesh mesh_of(const std::string& bytes, const std::string& path) {
@@ -138,49 +141,54 @@ private:
     }
 
     void add_body(const SceneBody& from) {
-        ReadyBody body;
+        const auto alike = std::ranges::find(result_.bodies, from.group, &ReadyBody::group);
+        const bool is_another = !from.group.empty() && alike != result_.bodies.end();
+        ReadyBody body = is_another ? *alike : ready(from);
         body.name = from.name;
+        body.color = from.color.value_or(kBodyColors[result_.bodies.size() % std::size(kBodyColors)]);
+        body.has_own_color = !from.color;
+        const Vec3d middle = body.scale * body_box(body).centre();
+        Actor actor{.body = body.body, .velocity = from.velocity, .spin = from.spin, .may_sleep = from.may_sleep};
+        const Vec3d centre = from.centre.value_or(middle + body.scale * body.origin) + from.aside;
+        actor.placement = Eigen::Translation3d(centre) * from.rotation * Eigen::Translation3d(-middle);
+        if (!is_another) warn_of_weight(from, *body.body, actor.placement.linear());
+        result_.actors.push_back(std::move(actor));
+        result_.bodies.push_back(std::move(body));
+    }
+
+    /// What a body is made of and from, wherever it stands.
+    ReadyBody ready(const SceneBody& from) {
+        ReadyBody body;
+        body.group = from.group;
         body.mesh_path = from.mesh;
         body.model = at_line(scene_, from.line, [&] { return model_of(from); });
         Mesh& mesh = body.model.mesh;
-        BodyOptions options = from.body;
-        if (from.size) options.scale = scale_of(mesh, from);
-        body.scale = options.scale;
-        const Vec3d origin = std::exchange(mesh.origin, Vec3d::Zero());
+        body.origin = std::exchange(mesh.origin, Vec3d::Zero());
         hash_.add(mesh.positions);
         hash_.add(mesh.corners);
         body.body = at_line(scene_, from.line, [&] {
             return std::make_shared<const Body>(
-                make_body(mesh, from.material, options, context_, &body.report).value());
+                make_body(mesh, from.material, from.body, context_, &body.report).value());
         });
-        if (!body.report.warning.empty()) warn("body '" + body.name + "': " + body.report.warning);
+        body.scale = body.body->scale;
+        if (!body.report.warning.empty()) warn(called(from) + ": " + body.report.warning);
         const bool has_own_driver = !body.model.levels.empty();
         if (!has_own_driver)
             body.model = at_line(scene_, from.line, [&] { return stripped(std::move(mesh), from, *body.body); });
         hash_.add(body.model.driver().vertices);
         body.driver = measure_driver(body.model, *body.body);
         const std::string coarse = driver_warning(body.driver, body.model, *body.body);
-        if (has_own_driver && !coarse.empty()) warn("body '" + body.name + "': " + coarse);
-        body.color = from.color.value_or(kBodyColors[result_.bodies.size() % std::size(kBodyColors)]);
-        body.has_own_color = !from.color;
-
-        const Vec3d middle = body.scale * body_box(body).centre();
-        Actor actor{body.body, Eigen::Isometry3d::Identity(), from.velocity, from.spin};
-        actor.placement = Eigen::Translation3d(from.centre.value_or(middle + body.scale * origin)) * from.rotation *
-                          Eigen::Translation3d(-middle);
-        const std::string weight =
-            weight_warning(*body.body, body_box(body), actor.placement.linear(), scene_.gravity, from.material_name);
-        if (!weight.empty()) warn("body '" + body.name + "' " + weight);
-        result_.actors.push_back(std::move(actor));
-        result_.bodies.push_back(std::move(body));
+        if (has_own_driver && !coarse.empty()) warn(called(from) + ": " + coarse);
+        return body;
     }
 
-    /// m a model unit, for a mesh whose longest side the scene says.
-    double scale_of(const Mesh& mesh, const SceneBody& from) const {
-        const double longest = bounds(mesh).size().maxCoeff();
-        if (!(longest > 0))
-            fail_in_scene(scene_, from.line, ErrorCode::unsuitable, from.mesh + ": has no size that could be scaled");
-        return *from.size / longest;
+    static std::string called(const SceneBody& body) {
+        return fmt::format("body '{}'", body.group.empty() ? body.name : body.group);
+    }
+
+    void warn_of_weight(const SceneBody& from, const Body& body, const Mat3d& turn) {
+        const std::string weight = weight_warning(body, turn, scene_.gravity, from.material_name, from.body.size);
+        if (!weight.empty()) warn(called(from) + " " + weight);
     }
 
     /// The middle of the bodies where it is far from the world's origin, rounded so that taking it off is exact.
@@ -305,11 +313,9 @@ private:
             Mesh& mesh = drawn.mesh;
             hash_.add(mesh.positions);
             hash_.add(mesh.corners);
-            MeshObstacle shape;
             OutwardReport outward;
-            shape.field = at_line(scene_, from.line, [&] {
-                return std::make_shared<const DistanceField>(
-                    DistanceField::create(mesh, from.scale, from.spacing, context_, &outward).value());
+            MeshObstacle shape = at_line(scene_, from.line, [&] {
+                return make_mesh_obstacle(mesh, from.scale, from.spacing, context_, &outward).value();
             });
             if (const std::string turned = outward_sentence(outward); !turned.empty())
                 warn("obstacle '" + from.mesh + "': " + turned);

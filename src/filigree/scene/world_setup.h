@@ -9,9 +9,11 @@ namespace filigree {
 
 struct ReadyBody {
     std::string name;
-    std::string mesh_path; ///< "" for a built-in shape
-    Model model;           ///< its origin is zero: poses say where it is, from the scene's
-    double scale = 1;      ///< metres a model unit
+    std::string group;            ///< of repeated bodies; else ""
+    std::string mesh_path;        ///< "" for a built-in shape
+    Model model;                  ///< its origin is zero: poses say where it is, from the scene's
+    Vec3d origin = Vec3d::Zero(); ///< that its mesh had, model units
+    double scale = 1;             ///< metres a model unit
     std::shared_ptr<const Body> body;
     BodyReport report;
     DriverEdges driver;

@@ -1,5 +1,8 @@
 #include "filigree/physics/body/body_state.h"
 
+#include "filigree/core/dense_solve.h"
+
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +14,7 @@ namespace {
 
 constexpr double kLight = 0.3, kLightBeside = 0.2; ///< of what a full cell gives its corner, and of the mean
 constexpr double kSurfaceStiffness = 4;            ///< times the stiffness of a spacing of material under the point
+constexpr float kMostFlow = 4; ///< stretch, and 1 over it: what flows is sheared without end, its detail is not
 
 /// The cells whose corners are the particles; null for meshfree bodies.
 const Cells* corners_of(const Body& body) {
@@ -18,6 +22,17 @@ const Cells* corners_of(const Body& body) {
 }
 
 } // namespace
+
+Mat3f bounded_stretch(const Mat3f& gradient) {
+    if (!gradient.allFinite()) return Mat3f::Identity();
+    // Of stretches a >= b >= c: a <= |F|, and c = det F / (a b) >= 2 det F / |F|^2.
+    const float squared = gradient.squaredNorm();
+    if (squared < kMostFlow * kMostFlow && 2 * std::abs(gradient.determinant()) * kMostFlow > 1.0001f * squared)
+        return gradient;
+    const SingularValues<float> svd = singular_values(gradient);
+    if (svd.s.maxCoeff() <= kMostFlow && svd.s.minCoeff() >= 1 / kMostFlow) return gradient;
+    return svd.u * svd.s.cwiseMax(1 / kMostFlow).cwiseMin(kMostFlow).asDiagonal() * svd.v.transpose();
+}
 
 std::vector<std::uint8_t> light_particles(const Body& body) {
     const std::vector<float>& mass = body.mass;

@@ -36,7 +36,7 @@ struct BodyState {
     std::size_t first_piece = 0;              ///< ... and the first of their numbers
     std::unique_ptr<Elasticity> elasticity;
     Vectors positions, velocities;    ///< world, m and m/s
-    Vectors forces;                   ///< N, of the last evaluation
+    Vectors forces;                   ///< N, of the last evaluation; on the grid those from outside alone
     std::vector<float> inverse_mass;  ///< 0: pinned
     std::vector<std::uint8_t> fixed;  ///< 1: pinned
     float rest_squared_frequency = 0; ///< ElasticReport::squared_frequency at rest
@@ -66,18 +66,19 @@ struct BodyState {
     bool is_hidden(std::size_t point) const { return !hidden.empty() && hidden[point]; }
 };
 
+/// A gradient with its stretches within 1/4 and 4; the identity for one that is not finite.
+Mat3f bounded_stretch(const Mat3f& gradient);
+
 /// Of each corner, whether its cells are hardly filled. Such corners fly to and fro beside the rest at ten times its
 /// speed, and carry nothing.
 std::vector<std::uint8_t> light_particles(const Body& body);
 void find_light_corners(BodyState& state);
 
-/// Calls visit(body, number, particle) for a particle of a body, or of one that has broken for each of its copies; of
-/// one on the grid not at all.
+/// Calls visit(body, number, particle) for a particle of a body, or of one that has broken for each of its copies.
 template <class State, class Visit>
 void each_copy(std::span<State> bodies, std::size_t body, Index particle, const Visit& visit) {
     const BodyState& whole = bodies[body];
-    if (whole.is_on_grid) return;
-    if (!whole.is_absent) return visit(bodies[body], body, particle);
+    if (!whole.is_absent || whole.is_on_grid) return visit(bodies[body], body, particle);
     for (const CornerCopy& copy : whole.broken->copies_of(particle))
         visit(bodies[whole.first_piece + copy.piece], whole.first_piece + copy.piece, copy.corner);
 }
@@ -129,13 +130,17 @@ inline float yielding(const Embedding& embedding, std::size_t point, const std::
     return sum;
 }
 
-/// Moves a particle by its weight over its mass, as XPBD projects a constraint of zero compliance.
-inline void push_particle(BodyState& body, Index particle, float weight, const Vec3f& way, const Vec3f& velocity) {
-    const float share = weight * body.inverse_mass[particle];
-    body.positions.add(particle, share * way);
+/// Moves a particle by its weight over its mass, as XPBD projects a constraint of zero compliance, but no further than
+/// `most`, m: light corners of the cell would be thrown through the others.
+inline void push_particle(BodyState& body, Index particle, float weight, const Vec3f& way, const Vec3f& velocity,
+                          float most) {
+    const float share = weight * body.inverse_mass[particle], asked = std::abs(share) * way.norm();
+    const float moved = std::min(asked, most);
+    const Vec3f step = moved > 0 ? Vec3f(share * (moved / asked) * way) : Vec3f(Vec3f::Zero());
+    body.positions.add(particle, step);
     body.velocities.add(particle, share * velocity);
-    if (body.corners) body.corners->follow(particle, share * way, share * velocity);
-    body.pushed_way = std::max(body.pushed_way, std::abs(share) * way.norm());
+    if (body.corners) body.corners->follow(particle, step, share * velocity);
+    body.pushed_way = std::max(body.pushed_way, moved);
 }
 
 } // namespace filigree

@@ -7,8 +7,6 @@
 
 namespace filigree {
 
-void Elasticity::prepare_blocks() {}
-void Elasticity::add_block(Index, const Vectors&, Vec3f&, Symmetric3&) const {}
 void Elasticity::finish_substep(const Vectors&, float, const RunContext&) {}
 std::size_t Elasticity::flowed_out() const { return 0; }
 std::span<const PlasticCell> Elasticity::plastic_cells() const { return {}; }

@@ -1,4 +1,4 @@
-// What the stepper asks of a material: forces, the 3x3 blocks of a descent sweep, gradients.
+// What the stepper asks of a material: forces, energy, gradients.
 #pragma once
 
 #include "filigree/core/run_context.h"
@@ -12,45 +12,6 @@ namespace filigree {
 
 struct Body;
 struct PlasticCell;
-
-/// A symmetric 3x3 matrix.
-struct Symmetric3 {
-    float xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
-    void add_scaled_identity(float s) {
-        xx += s;
-        yy += s;
-        zz += s;
-    }
-    /// += s v v^T
-    void add_outer(const Vec3f& v, float s) {
-        xx += s * v.x() * v.x();
-        yy += s * v.y() * v.y();
-        zz += s * v.z() * v.z();
-        xy += s * v.x() * v.y();
-        xz += s * v.x() * v.z();
-        yz += s * v.y() * v.z();
-    }
-    /// The solution of (this + 1e-6 trace I) d = b by LDL^T; zero where that cannot be computed (not finite). For
-    /// positive semidefinite matrices. Inline in vertex_block.h.
-    Vec3f solve(const Vec3f& b) const;
-};
-
-/// Force and block (minus its derivative, made positive semidefinite) of everything that acts on single particles from
-/// outside: contacts, hands. Asked from many threads.
-class BlockTerms {
-public:
-    virtual ~BlockTerms() = default;
-    virtual void add(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const = 0;
-};
-
-/// One time step's minimisation, E(x) = sum m / (2 dt^2) |x - target|^2 + elastic energy + external.
-struct Descent {
-    const Vectors& target;                 ///< inertial positions x + dt v + dt^2 g
-    std::span<const float> inertia;        ///< m / dt^2 of each particle
-    std::span<const std::uint8_t> fixed;   ///< 1: not to be moved
-    std::span<const std::uint8_t> touched; ///< 1: external terms are to be asked
-    const BlockTerms* external = nullptr;
-};
 
 /// What one look at all elements found, beside forces.
 struct ElasticReport {
@@ -70,15 +31,6 @@ public:
 
     /// Elastic forces, N, into `forces` (overwritten). Same bytes for any thread count and vector width.
     virtual ElasticReport forces(const Vectors& positions, Vectors& forces, const RunContext& context) = 0;
-
-    /// One sweep of vertex block descent [Chen 2024] over all particles, colour by colour:
-    /// x += (inertia I + H)^-1 (inertia (target - x) + f), f and H of the elastic energy at the current positions.
-    virtual void sweep(Vectors& positions, const Descent& descent, const RunContext& context) = 0;
-
-    /// Adds the elastic force on one particle and its block, as a sweep has them; prepare_blocks comes first, once. For
-    /// fem alone; others add nothing.
-    virtual void prepare_blocks();
-    virtual void add_block(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const;
 
     /// Elastic energy, J; 0 at rest.
     virtual double energy(const Vectors& positions, const RunContext& context) const = 0;

@@ -25,22 +25,6 @@ constexpr double kWindingAccuracy = 0.03;
 constexpr std::size_t kSlabBytes = std::size_t{1} << 27;
 constexpr double kWhole = 1e-6; // relative: sides this close to whole numbers of cells are
 
-/// Points at the centres of the n^3 cubes of each cell, layers k_begin .. k_end - 1 of cells. Rounded to few bits, so
-/// that the scan's exact decisions are quick.
-Lattice sample_points(const Grid& grid, unsigned n, std::size_t k_begin, std::size_t k_end) {
-    const double step = grid.spacing / n, bit = std::ldexp(1.0, std::ilogb(step) - 24);
-    Lattice lattice;
-    lattice.spacing = std::nearbyint(step / bit) * bit;
-    for (int axis = 0; axis < 3; ++axis) {
-        const std::size_t begin = axis == 2 ? n * k_begin : 0, end = n * (axis == 2 ? k_end : grid.counts[axis]);
-        const double first = std::nearbyint((grid.origin[axis] + step / 2) / bit) * bit;
-        lattice.coordinates[axis].resize(end - begin);
-        for (std::size_t i = begin; i < end; ++i)
-            lattice.coordinates[axis][i - begin] = first + double(i) * lattice.spacing;
-    }
-    return lattice;
-}
-
 struct Samples {
     unsigned count = 0;
     std::array<unsigned, 3> sums = {}; ///< of the samples' places in the cell, counted from 0
@@ -136,6 +120,20 @@ Status look_closer(const InsideSampler& sampler, const Grid& grid, std::vector<D
 }
 
 } // namespace
+
+Lattice sample_points(const Grid& grid, unsigned n, std::size_t k_begin, std::size_t k_end) {
+    const double step = grid.spacing / n, bit = std::ldexp(1.0, std::ilogb(step) - 24);
+    Lattice lattice;
+    lattice.spacing = std::nearbyint(step / bit) * bit;
+    for (int axis = 0; axis < 3; ++axis) {
+        const std::size_t begin = axis == 2 ? n * k_begin : 0, end = n * (axis == 2 ? k_end : grid.counts[axis]);
+        const double first = std::nearbyint((grid.origin[axis] + step / 2) / bit) * bit;
+        lattice.coordinates[axis].resize(end - begin);
+        for (std::size_t i = begin; i < end; ++i)
+            lattice.coordinates[axis][i - begin] = first + double(i) * lattice.spacing;
+    }
+    return lattice;
+}
 
 std::string number(double x) {
     char text[32];

@@ -24,6 +24,10 @@ struct Grid {
 /// a model unit, for the error's sentence. Errors: unsuitable (too many cells).
 Result<Grid> make_grid(const Box& box, double spacing, double scale);
 
+/// Points at the centres of the n^3 cubes of each cell, layers k_begin .. k_end - 1 of cells. Rounded to few bits, so
+/// that the scan's exact decisions are quick.
+Lattice sample_points(const Grid& grid, unsigned n, std::size_t k_begin, std::size_t k_end);
+
 /// Four digits of a number, for sentences.
 std::string number(double x);
 

@@ -5,7 +5,6 @@
 #include "filigree/physics/fem/cell_kernel.h"
 #include "filigree/physics/fem/cofactor.h"
 #include "filigree/physics/fem/plastic_cells.h"
-#include "filigree/physics/fem/vertex_block.h"
 
 #include <algorithm>
 #include <limits>
@@ -16,7 +15,7 @@ using namespace crack_law;
 
 namespace {
 
-constexpr std::size_t kCrackGrain = 256, kSweptGrain = 64;
+constexpr std::size_t kCrackGrain = 256;
 constexpr float kLeastHeld = 0.05f;  ///< part of a facet that counts as holding
 constexpr float kOpeningStep = 0.1f; ///< of the last opening that a crack may widen in a substep
 
@@ -41,9 +40,6 @@ Cracks::Cracks(std::shared_ptr<const Fracture> fracture, std::size_t whole, std:
     for (const CrackLink& link : body().links)
         strengths_.push_back(strength_of(fracture_->material, body().number_of_piece[link.pieces[0]],
                                          body().number_of_piece[link.pieces[1]]));
-    links_at_.assign(body().whole->rest.size() + 1, 0);
-    for (const CrackLink& link : body().links) ++links_at_[link.corner + 1];
-    for (std::size_t c = 1; c < links_at_.size(); ++c) links_at_[c] += links_at_[c - 1];
     find_tied();
 }
 
@@ -318,7 +314,6 @@ void Cracks::find_groups(std::span<BodyState> bodies) {
         }
     }
     find_tied();
-    find_swept(bodies);
 }
 
 void Cracks::find_tied() {
@@ -332,92 +327,6 @@ void Cracks::find_tied() {
     }
     for (Index f = 0; f < is_felt.size(); ++f)
         if (is_felt[f]) facets_of_tied_.push_back(f);
-}
-
-/// Which copies descent moves together, and in what order.
-void Cracks::find_swept(std::span<const BodyState> bodies) {
-    left_out_.clear();
-    for (Index piece = 0; piece < body().pieces.size(); ++piece) left_out_.push_back(state(bodies, piece).fixed);
-    for (std::vector<Index>& corners : swept_corners_) corners.clear();
-    if (!is_open_) return;
-    std::vector<std::uint8_t> is_swept(body().copies.size(), 0);
-    for (const Index copy : members_) is_swept[copy] = 1;
-    for (Index l = 0; l < links_.size(); ++l)
-        if (links_[l].phase == LinkState::coming_apart)
-            for (const Index copy : body().links[l].copies) is_swept[copy] = 1;
-    for (Index corner = 0; corner + 1 < body().copy_offsets.size(); ++corner) {
-        bool any = false;
-        for (Index copy = body().copy_offsets[corner]; copy < body().copy_offsets[corner + 1]; ++copy) {
-            if (!is_swept[copy]) continue;
-            left_out_[body().copies[copy].piece][body().copies[copy].corner] = 1;
-            any = true;
-        }
-        const auto& at = body().whole->cells.corners[corner];
-        if (any) swept_corners_[(at[0] & 1) + 2 * (at[1] & 1) + 4 * (at[2] & 1)].push_back(corner);
-    }
-}
-
-void Cracks::sweep(std::span<const PieceSweep> pieces, std::span<const BodyState> bodies,
-                   const RunContext& context) const {
-    for (const std::vector<Index>& corners : swept_corners_) // of equal parities: they share no cell
-        parallel_for(context, corners.size(), kSweptGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t c = begin; c < end; ++c) sweep_corner(corners[c], pieces, bodies);
-        });
-}
-
-/// Moves each group of a corner's copies by its 3x3 system.
-void Cracks::sweep_corner(Index corner, std::span<const PieceSweep> pieces, std::span<const BodyState> bodies) const {
-    const std::vector<CornerCopy>& copies = body().copies;
-    const Index begin = body().copy_offsets[corner], end = body().copy_offsets[corner + 1];
-    const auto energy = float(fracture_->material.energy);
-    for (Index root = begin; root < end; ++root) {
-        const CornerCopy& first = copies[root];
-        if (group_of_copy_[root] != root || !left_out_[first.piece][first.corner] ||
-            !(state(bodies, first.piece).inverse_mass[first.corner] > 0))
-            continue;
-        Vec3f force = Vec3f::Zero();
-        Symmetric3 block;
-        for (Index copy = root; copy < end; ++copy) {
-            if (group_of_copy_[copy] != root) continue;
-            const auto& [piece, particle] = copies[copy];
-            const PieceSweep& sweep = pieces[piece];
-            Symmetric3 own; // by what is swept
-            state(bodies, piece).elasticity->add_block(particle, *sweep.swept, force, own);
-            if (sweep.touched[particle]) sweep.external->add(particle, *sweep.swept, force, own);
-            for (const auto part :
-                 {&Symmetric3::xx, &Symmetric3::yy, &Symmetric3::zz, &Symmetric3::xy, &Symmetric3::xz, &Symmetric3::yz})
-                block.*part += sweep.ahead * own.*part;
-            force += sweep.inertia[particle] * ((*sweep.target)[particle] - (*sweep.positions)[particle]);
-            block.add_scaled_identity(sweep.inertia[particle]);
-        }
-        for (Index l = links_at_[corner]; l < links_at_[corner + 1]; ++l) {
-            if (links_[l].phase != LinkState::coming_apart) continue;
-            const CrackLink& link = body().links[l];
-            const bool is_first = group_of_copy_[link.copies[0]] == root;
-            if (is_first == (group_of_copy_[link.copies[1]] == root)) continue; // of others, or still tied
-            const CohesionSpring spring =
-                cohesion_spring(links_[l].cohesion, between(l, bodies), link.area, energy, stiffest(l, bodies));
-            force += (is_first ? spring.stiffness : -spring.stiffness) * spring.stretch;
-            block.add_scaled_identity(spring.stiffness);
-        }
-        const Vec3f way = block.solve(force);
-        for (Index copy = root; copy < end; ++copy) {
-            if (group_of_copy_[copy] != root) continue;
-            const auto& [piece, particle] = copies[copy];
-            const PieceSweep& sweep = pieces[piece];
-            sweep.positions->add(particle, way);
-            if (sweep.swept != sweep.positions) sweep.swept->add(particle, sweep.ahead * way);
-        }
-    }
-}
-
-std::vector<Index> Cracks::parts() const {
-    DisjointSets sets(body().pieces.size());
-    for (Index l = 0; l < links_.size(); ++l)
-        if (links_[l].phase != LinkState::free) sets.join(body().links[l].pieces[0], body().links[l].pieces[1]);
-    std::vector<Index> roots;
-    for (Index piece = 0; piece < body().pieces.size(); ++piece) roots.push_back(sets.root(piece));
-    return roots;
 }
 
 Cracks::Pace Cracks::add_forces(std::span<BodyState> bodies, const RunContext& context) const {

@@ -44,23 +44,6 @@ public:
     /// Adds what holds pieces that come apart, then adds up over tied copies.
     Pace add_forces(std::span<BodyState> bodies, const RunContext& context) const;
 
-    /// A piece's body in a sweep of descent: its particles, and what is swept, which moves `ahead` times as far (the
-    /// same, and 1, without internal damping).
-    struct PieceSweep {
-        Vectors *positions, *swept;
-        float ahead = 1;
-        const Vectors* target;
-        std::span<const float> inertia; ///< of each copy; m / dt^2
-        const BlockTerms* external;
-        std::span<const std::uint8_t> touched;
-    };
-    /// What sweeps of a piece's body leave to sweep(): 1 for copies that are tied, coming apart or pinned.
-    std::span<const std::uint8_t> left_out(Index piece) const { return left_out_[piece]; }
-    /// A step of descent for those. Same bytes for any number of threads.
-    void sweep(std::span<const PieceSweep> pieces, std::span<const BodyState> bodies, const RunContext& context) const;
-    /// The lowest piece of those that each hangs together with, also by what is coming apart.
-    std::vector<Index> parts() const;
-
     /// Around something that moves copies one by one: what moved one of them then moves all that are tied.
     void remember_places(std::span<const BodyState> bodies);
     void rejoin(std::span<BodyState> bodies) const;
@@ -92,7 +75,6 @@ private:
     float most_opened(Index link) const;
     Vec3f between(Index link, std::span<const BodyState> bodies) const;
     float stiffest(Index link, std::span<const BodyState> bodies) const;
-    void sweep_corner(Index corner, std::span<const PieceSweep> pieces, std::span<const BodyState> bodies) const;
     void let_go(Index link, const Vec3f& pull, double time);
     bool open_links(std::span<const BodyState> bodies, double time, const RunContext& context);
     bool let_events_go(double time);
@@ -101,7 +83,6 @@ private:
     void hide(BodyState& to, Index piece) const;
     void find_groups(std::span<BodyState> bodies);
     void find_tied();
-    void find_swept(std::span<const BodyState> bodies);
 
     std::shared_ptr<const Fracture> fracture_;
     std::size_t whole_, first_;
@@ -109,17 +90,14 @@ private:
     double front_energy_; ///< J/m^2
     bool is_open_ = false;
     std::vector<LinkState> links_;
-    std::vector<double> broke_;                       ///< s, of each piece
-    std::vector<std::uint8_t> beside_crack_;          ///< of each link
-    std::vector<float> strengths_;                    ///< Pa, of each link away from cracks
-    std::vector<Index> tied_, facets_of_tied_;        ///< links, and what they feel
-    std::vector<Index> group_of_copy_;                ///< numbers into BrokenBody::copies
-    std::vector<Index> group_offsets_, members_;      ///< of the groups of two and more
-    std::vector<std::vector<std::uint8_t>> left_out_; ///< of each piece
-    std::array<std::vector<Index>, 8> swept_corners_; ///< of the whole, by the parities of their places
-    std::vector<Index> links_at_;                     ///< of each corner of the whole, the first link
-    std::vector<Vec3f> places_, speeds_;              ///< of those, by remember_places
-    double checked_until_ = -1;                       ///< s: events before that are done
+    std::vector<double> broke_;                  ///< s, of each piece
+    std::vector<std::uint8_t> beside_crack_;     ///< of each link
+    std::vector<float> strengths_;               ///< Pa, of each link away from cracks
+    std::vector<Index> tied_, facets_of_tied_;   ///< links, and what they feel
+    std::vector<Index> group_of_copy_;           ///< numbers into BrokenBody::copies
+    std::vector<Index> group_offsets_, members_; ///< of the groups of two and more
+    std::vector<Vec3f> places_, speeds_;         ///< of those, by remember_places
+    double checked_until_ = -1;                  ///< s: events before that are done
 };
 
 } // namespace filigree

@@ -1,4 +1,4 @@
-// The formulas of contact, shared by explicit steps and descent. Private to the layer.
+// The formulas of contact. Private to the layer.
 #pragma once
 
 #include "filigree/physics/body/body_state.h"

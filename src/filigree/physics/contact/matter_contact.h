@@ -7,6 +7,7 @@
 #include "filigree/physics/contact/matter.h"
 #include "filigree/physics/contact/own_cells.h"
 #include "filigree/physics/contact/pair_laws.h"
+#include "filigree/physics/rigid/rigid_contacts.h"
 
 #include <algorithm>
 #include <limits>
@@ -19,6 +20,14 @@ struct ContactReport {
     float deepest = 0;        ///< m, in an obstacle
     float deepest_in_matter = 0;
 };
+
+/// A particle and its part in how a place in matter moves.
+struct Carrier {
+    Index particle;
+    float weight;
+};
+/// The particles that move a place in matter, each once.
+std::vector<Carrier> carriers_of(const BodyState& body, const Matter& matter, const Matter::Place& place);
 
 class CellBoxes;
 
@@ -69,17 +78,9 @@ public:
     /// bodies that something touches wake; returns whether any did. frame: s, for about so long
     /// what is found is to hold.
     bool search(std::span<BodyState> bodies, double frame, const RunContext& context);
-    /// Begins anew, and finds only which bodies are near each other, for longest_step.
-    void find_approaching(std::span<const BodyState> bodies, double frame, const RunContext& context);
-    /// Calls visit(body, other) for each two different bodies of which points touched at last.
-    template <class Visit>
-    void each_touching(const Visit& visit) const {
-        for (const Side& side : sides_)
-            if (side.body != side.other &&
-                std::ranges::any_of(side.pairs, [](const Pair& pair) { return pair.depth > 0; }))
-                visit(side.body, side.other);
-    }
-    /// The same of those that friction holds together.
+    /// Which pairs forces are asked for, after bodies went to sleep or woke.
+    void list_work(std::span<const BodyState> bodies);
+    /// Calls visit(body, other) for each two different bodies that touch.
     template <class Visit>
     void each_holding(const Visit& visit) const {
         for (const Side& side : sides_)
@@ -97,7 +98,7 @@ public:
     static constexpr std::uint8_t kTouched = 2, kTouchedItself = 4;
     /// As Contacts::add_forces. touched: of each body; kTouched or kTouchedItself is set where it touches.
     ContactReport add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
-                             const RunContext& context);
+                             RigidContacts& rigid, const RunContext& context);
     /// As Contacts::push_out.
     void push_out(std::span<BodyState> bodies);
 
@@ -109,13 +110,14 @@ public:
         float depth = 0;       ///< now
         contact_law::Grasp grasp;
         Matter::Place anchor;
-        Vec3f entry = Vec3f::Zero(); ///< normal at rest on the side where the point came in; zero outside
-        bool tangled = false;        ///< it did not come in from outside, and is left alone until it is out
+        Vec3f entry = Vec3f::Zero();       ///< normal at rest on the side where the point came in; zero outside
+        bool tangled = false;              ///< it did not come in from outside, and is left alone until it is out
+        Vec3f rigid_force = Vec3f::Zero(); ///< N, of two rigid bodies: of the last substep
     };
     struct PairMemory {
         Index point, cell, anchor_cell;
         std::uint32_t flags; ///< 1: holds, 2: slides, 4: tangled
-        Vec3f local, anchor_local, entry;
+        Vec3f local, anchor_local, entry, rigid_force;
     };
     struct SideMemory {
         Index body, other, pairs; ///< how many
@@ -132,23 +134,9 @@ public:
     bool is_sound(const Memory& memory, std::span<const BodyState> bodies) const;
     void set_memory(const Memory& memory, std::span<const BodyState> bodies);
 
-    /// A pair as descent sees it in a substep: the matter's frame stands still.
-    struct Frame {
-        Index body, other, point;
-        Matter::Place place;
-        Vec3f normal = Vec3f::Zero();
-        Vec3f start = Vec3f::Zero(); ///< from the point to the matter at its place, before anything moves
-        float depth = 0;             ///< then; below 0 outside
-        float stiffness = 0, unloading = 1, friction = 0;
-        bool holds = false;
-        Vec3f offset = Vec3f::Zero(); ///< from the anchor, along the surface, then
-    };
-    std::vector<Frame> frames(std::span<const BodyState> bodies, float dt) const;
-    /// Sleepers wake that something is about to touch. Returns whether any did.
-    bool wake_met(std::span<BodyState> bodies, std::span<const Frame> frames) const;
+    bool has_matter(std::size_t body) const { return matter_[body] != nullptr; }
     const Matter& matter(std::size_t body) const { return *matter_[body]; }
-    /// After a descent substep: what touches, and friction's anchors, as positions say.
-    ContactReport update_anchors(std::span<const BodyState> bodies, std::span<std::uint8_t> touched);
+    const PairLaws& laws() const { return laws_; }
 
 private:
     /// Points of one body against the matter of another, or of its own.
@@ -160,6 +148,7 @@ private:
         float since = std::numeric_limits<float>::max(); ///< s since the last search
         float speed = 0;                                 ///< m/s, the same bound's
         float spacing = 0;                               ///< m, the smaller of both
+        bool is_rigid = false;                           ///< both bodies are
         PairContact law;
         std::vector<Pair> pairs;
     };
@@ -194,8 +183,6 @@ private:
     void find_pairs(std::span<const Index> due, std::span<const BodyState> bodies, float frame,
                     const RunContext& context);
     bool wake_touched(std::span<BodyState> bodies) const;
-    bool disturbs(const BodyState& body, std::size_t number) const;
-    void list_work(std::span<const BodyState> bodies);
     void find_sides(std::span<const BodyState> bodies, double frame, const RunContext& context);
     std::optional<Vec3f> enter(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
     static bool is_elsewhere(const Pair& pair, const Matter::Place& place, const Matter& matter) {
@@ -212,6 +199,14 @@ private:
     float stiffness(const Side& side, const Pair& pair, std::span<const BodyState> bodies) const;
     void anchor_at(Pair& pair, const Side& side, const BodyState& other, const Vec3f& offset) const;
     Vec3f force(Pair& pair, const Side& side, std::span<const BodyState> bodies, float dt) const;
+    /// Spacings: the most of margin_of.
+    static constexpr float kMostMargin = 0.5f;
+    static float margin_of(const Side& side) { ///< m, of two rigid bodies
+        return std::min(touching_margin(side.spacing, side.speed), kMostMargin * side.spacing);
+    }
+    Vec3f probe(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
+    static void add_contact_point(Pair& pair, const Side& side, std::span<const BodyState> bodies, const Vec3f& normal,
+                                  RigidContacts& rigid);
     void push_out(Pair& pair, const Side& side, std::span<BodyState> bodies) const;
 
     const World& world_;
@@ -237,12 +232,14 @@ private:
     std::vector<Side> sides_;      ///< ascending by bodies
     float way_ = 0, sides_until_ = -1;
     std::vector<std::pair<Index, Index>> work_; ///< side and pair of each force
-    struct PairForce { ///< beside how deep its pair touches, so that those that do not are passed over fast
+    /// Beside how deep its pair touches, so that those that do not are passed over fast. Of two rigid bodies the
+    /// normal, or zero far from each other.
+    struct PairForce {
         Vec3f force = Vec3f::Zero();
         float depth = 0;
     };
     std::vector<PairForce> forces_; ///< of work_
-    bool is_too_deep_ = false; ///< something touches deeper than push_out lets it, as add_forces or update_anchors saw
+    bool is_too_deep_ = false;      ///< something touches deeper than push_out lets it, as add_forces saw
 };
 
 } // namespace filigree

@@ -1,4 +1,4 @@
-// Contacts in matter: forces in explicit steps, moving out what is too deep; frames and anchors in descent.
+// Contacts in matter: forces, and moving out what is too deep.
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/contact/cell_boxes.h"
 #include "filigree/physics/contact/matter_contact.h"
@@ -15,15 +15,12 @@ namespace {
 constexpr std::size_t kMatterForcesGrain = 128;
 /// Of a side's speed: what its pairs may gain unasked; less of those beside their own place, which all move alike.
 constexpr float kSlowest = 0.2f, kSlowestBeside = 0.02f;
-constexpr float kLittle = 0.05f;      ///< spacings until a point that is nowhere is asked again ...
-constexpr float kLittleBeside = 0.2f; ///< ... and the same of those, by their own speed
+constexpr float kLittle = 0.05f;        ///< spacings until a point that is nowhere is asked again ...
+constexpr float kLittleBeside = 0.2f;   ///< ... and the same of those, by their own speed
+constexpr float kClearerOfRigid = 0.8f; ///< part of a distance from a rigid body that is safe to go
 
-struct Carrier {
-    Index particle;
-    float weight;
-};
+} // namespace
 
-/// The particles that move a place in matter, each once.
 std::vector<Carrier> carriers_of(const BodyState& body, const Matter& matter, const Matter::Place& place) {
     const Matter::Weights weights = matter.weights(place);
     const auto& corners = matter.corners(place.cell);
@@ -46,8 +43,6 @@ std::vector<Carrier> carriers_of(const BodyState& body, const Matter& matter, co
     carriers.resize(std::min(kept + 1, carriers.size()));
     return carriers;
 }
-
-} // namespace
 
 void MatterContacts::leave(Pair& pair, const Side& side, float clearance) const {
     pair.depth = 0;
@@ -172,6 +167,41 @@ Vec3f MatterContacts::force(Pair& pair, const Side& side, std::span<const BodySt
     return force;
 }
 
+/// Of two rigid bodies: the normal where the point lies in the other, or may lie before the next substep ends; else
+/// zero. pair.depth is below 0 outside.
+Vec3f MatterContacts::probe(Pair& pair, const Side& side, std::span<const BodyState> bodies) const {
+    if (pair.clear_until > side.way) return Vec3f::Zero();
+    const BodyState &body = bodies[side.body], &other = bodies[side.other];
+    const Matter& matter = *matter_[side.other];
+    const Vec3f point = embedded_point(body.surface, pair.point, body.positions);
+    Mat3f inverse;
+    const bool is_found = matter.locate(other.positions, point, pair.place, inverse);
+    const auto found = is_found ? matter.depth(pair.place, inverse, pair.entry) : std::nullopt;
+    const float margin = margin_of(side);
+    if (!found || found->depth < -margin) {
+        leave(pair, side, found ? kClearerOfRigid * (-found->depth - margin) : kLittle * side.spacing);
+        pair.rigid_force = Vec3f::Zero();
+        return Vec3f::Zero();
+    }
+    pair.depth = found->depth;
+    pair.entry = found->depth > 0 ? found->rest : Vec3f(Vec3f::Zero());
+    return found->normal;
+}
+
+void MatterContacts::add_contact_point(Pair& pair, const Side& side, std::span<const BodyState> bodies,
+                                       const Vec3f& normal, RigidContacts& rigid) {
+    const BodyState& body = bodies[side.body];
+    rigid.add({.body = side.body,
+               .other = side.other,
+               .place = embedded_point(body.surface, pair.point, body.positions),
+               .normal = normal,
+               .separation = -pair.depth,
+               .friction = float(side.law.friction),
+               .restitution = float(side.law.restitution),
+               .force = &pair.rigid_force,
+               .holds = &pair.grasp.holds});
+}
+
 /// Puts the anchor so far behind the point.
 void MatterContacts::anchor_at(Pair& pair, const Side& side, const BodyState& other, const Vec3f& offset) const {
     pair.anchor = pair.place;
@@ -180,7 +210,7 @@ void MatterContacts::anchor_at(Pair& pair, const Side& side, const BodyState& ot
 }
 
 ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
-                                         const RunContext& context) {
+                                         RigidContacts& rigid, const RunContext& context) {
     ContactReport report;
     is_too_deep_ = false;
     forces_.resize(work_.size());
@@ -188,22 +218,26 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         for (std::size_t k = begin; k < end; ++k) {
             Side& side = sides_[work_[k].first];
             Pair& pair = side.pairs[work_[k].second];
-            const Vec3f on_point = force(pair, side, bodies, dt);
-            forces_[k] = {on_point, pair.depth};
+            const Vec3f found = side.is_rigid ? probe(pair, side, bodies) : force(pair, side, bodies, dt);
+            forces_[k] = {found, pair.depth};
         }
     });
     for (std::size_t k = 0; k < work_.size(); ++k) {
         const auto& [force, depth] = forces_[k];
+        if (!(depth > 0) && force.isZero(0)) continue;
+        Side& side = sides_[work_[k].first];
+        Pair& pair = side.pairs[work_[k].second];
+        if (side.is_rigid) add_contact_point(pair, side, bodies, force, rigid);
         if (!(depth > 0)) continue;
-        const Side& side = sides_[work_[k].first];
-        const Pair& pair = side.pairs[work_[k].second];
-        add_to_particles(bodies[side.body].surface, pair.point, force, bodies[side.body].forces);
-        matter_[side.other]->add(pair.place, -force, bodies[side.other].corner_forces());
+        if (!side.is_rigid) {
+            add_to_particles(bodies[side.body].surface, pair.point, force, bodies[side.body].forces);
+            matter_[side.other]->add(pair.place, -force, bodies[side.other].corner_forces());
+        }
         touched[side.body] |= touch_of(side);
         touched[side.other] |= touch_of(side);
         ++report.contacts;
         report.deepest_in_matter = std::max(report.deepest_in_matter, depth);
-        is_too_deep_ |= depth > most_depth(side);
+        is_too_deep_ |= !side.is_rigid && depth > most_depth(side);
     }
     for (std::size_t b = 0; b < bodies.size(); ++b)
         if (bodies[b].corners && touched[b] & (kTouched | kTouchedItself))
@@ -215,7 +249,7 @@ void MatterContacts::push_out(std::span<BodyState> bodies) {
     if (!is_too_deep_) return;
     for (Side& side : sides_) {
         const float most = most_depth(side);
-        if (both_sleep(side, bodies)) continue;
+        if (both_sleep(side, bodies) || side.is_rigid) continue;
         for (Pair& pair : side.pairs)
             if (pair.depth > most) push_out(pair, side, bodies);
     }
@@ -236,87 +270,8 @@ void MatterContacts::push_out(Pair& pair, const Side& side, std::span<BodyState>
     const Vec3f way = too_deep / gives * *normal;
     const Vec3f push = std::max(0.0f, -velocity.dot(*normal)) / gives * *normal;
     for (Index k = body.surface.offsets[pair.point]; k < body.surface.offsets[pair.point + 1]; ++k)
-        push_particle(body, body.surface.particles[k], body.surface.weights[k], way, push);
-    for (const auto& [particle, weight] : carriers) push_particle(other, particle, -weight, way, push);
-}
-
-std::vector<MatterContacts::Frame> MatterContacts::frames(std::span<const BodyState> bodies, float dt) const {
-    std::vector<Frame> frames;
-    for (const Side& side : sides_)
-        for (Pair pair : side.pairs) {
-            if (bodies[side.other].corners) break; // blocks are of particles
-            const BodyState &body = bodies[side.body], &other = bodies[side.other];
-            const Matter& matter = *matter_[side.other];
-            std::optional<Vec3f> normal = enter(pair, side, bodies);
-            float depth = pair.depth;
-            const Vec3f velocity = embedded_point(body.surface, pair.point, body.velocities) -
-                                   matter.mean(pair.place, other.corner_velocities());
-            if (!normal) { // what is outside may touch before the substep ends
-                if (pair.tangled || pair.clear_until > side.way + kMostReach * side.spacing) continue;
-                if (side.body == side.other && matter.are_together(matter.cell_of_point(pair.point), pair.place.cell))
-                    continue;
-            }
-            // The surface that is nearest when the substep ends: a point that comes in just behind an edge would run
-            // against the face that it is about to pass.
-            const Mat3f inverse = matter.inverse_derivative(other.corner_positions(), pair.place);
-            const Vec3f way = dt * velocity;
-            Matter::Place then = pair.place;
-            then.local += inverse * way;
-            const std::optional<Matter::Depth> found = matter.depth(then, inverse, pair.entry);
-            if (found && found->normal.allFinite() && (!normal || found->depth > 0)) {
-                depth = found->depth + way.dot(found->normal);
-                if (!normal) depth = std::min(0.0f, depth);
-                normal = found->normal;
-            }
-            if (!normal) continue;
-            Frame& frame = frames.emplace_back();
-            frame.body = side.body;
-            frame.other = side.other;
-            frame.point = pair.point;
-            frame.place = pair.place;
-            frame.normal = *normal;
-            frame.start = matter.mean(pair.place, other.corner_positions()) -
-                          embedded_point(body.surface, pair.point, body.positions);
-            frame.depth = depth;
-            frame.stiffness = stiffness(side, pair, bodies);
-            frame.unloading = unloading(side.law.restitution, velocity.dot(*normal), smooth_speed(world_, dt));
-            frame.friction = float(side.law.friction);
-            frame.holds = pair.grasp.holds;
-            if (frame.holds)
-                frame.offset = along_surface(matter.mean(pair.place, other.corner_positions()) -
-                                                 matter.mean(pair.anchor, other.corner_positions()),
-                                             frame.normal);
-        }
-    return frames;
-}
-
-ContactReport MatterContacts::update_anchors(std::span<const BodyState> bodies, std::span<std::uint8_t> touched) {
-    ContactReport report;
-    is_too_deep_ = false;
-    for (Side& side : sides_)
-        for (Pair& pair : side.pairs) {
-            const std::optional<Vec3f> normal = enter(pair, side, bodies);
-            if (!normal) continue;
-            const BodyState& other = bodies[side.other];
-            const Matter& matter = *matter_[side.other];
-            touched[side.body] |= touch_of(side);
-            touched[side.other] |= touch_of(side);
-            ++report.contacts;
-            report.deepest_in_matter = std::max(report.deepest_in_matter, pair.depth);
-            is_too_deep_ |= pair.depth > most_depth(side);
-            const bool landed = !pair.grasp.holds;
-            Vec3f offset = Vec3f::Zero();
-            if (!landed)
-                offset = along_surface(matter.mean(pair.place, other.corner_positions()) -
-                                           matter.mean(pair.anchor, other.corner_positions()),
-                                       *normal);
-            const float limit = float(side.law.friction) * pair.depth;
-            const float stretch = kTangentialStiffness * offset.norm();
-            pair.grasp = {true, stretch > limit};
-            if (stretch > limit) offset *= limit / stretch;
-            if (landed || pair.grasp.slides) anchor_at(pair, side, other, offset);
-        }
-    return report;
+        push_particle(body, body.surface.particles[k], body.surface.weights[k], way, push, too_deep);
+    for (const auto& [particle, weight] : carriers) push_particle(other, particle, -weight, way, push, too_deep);
 }
 
 } // namespace filigree

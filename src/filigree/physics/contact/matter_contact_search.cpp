@@ -301,19 +301,15 @@ void MatterContacts::find_sides(std::span<const BodyState> bodies, double frame,
 
 MatterContacts::Side MatterContacts::make_side(Index body, Index other, std::span<const BodyState> bodies) const {
     Side side{.body = body, .other = other, .law = laws_.of(bodies[body].actor, bodies[other].actor), .pairs = {}};
+    side.is_rigid = bodies[body].rigid && bodies[other].rigid;
     side.spacing = float(std::min(bodies[body].body->spacing(), bodies[other].body->spacing()));
     return side;
-}
-
-void MatterContacts::find_approaching(std::span<const BodyState> bodies, double frame, const RunContext& context) {
-    begin_anew();
-    begin_frame(bodies, context);
-    find_sides(bodies, frame, context);
 }
 
 /// Pairs of a side anew, and its way counts from here; those that touch stay. find(s): what point s is near.
 template <class Find>
 void MatterContacts::take_pairs(Side& side, const BodyState& body, std::size_t points, const Find& find) {
+    const float margin = side.is_rigid ? margin_of(side) : 0;
     std::vector<Pair> pairs;
     auto old = side.pairs.begin();
     for (Index s = 0; s < points; ++s) {
@@ -325,7 +321,7 @@ void MatterContacts::take_pairs(Side& side, const BodyState& body, std::size_t p
         else if (found.cell != kNoIndex && !body.is_hidden(s))
             pairs.push_back({.point = s,
                              .place = {found.cell},
-                             .clear_until = safe_way(side, found.gap),
+                             .clear_until = safe_way(side, found.gap - margin),
                              .grasp = {},
                              .anchor = {}});
     }
@@ -333,29 +329,13 @@ void MatterContacts::take_pairs(Side& side, const BodyState& body, std::size_t p
     side.pairs = std::move(pairs);
 }
 
-/// Of those that touch a sleeper: whatever came to it or moves. One that rests beside it has gone to rest with it.
-bool MatterContacts::disturbs(const BodyState& body, std::size_t number) const {
-    return !body.sleeps() && (!body.rigid || !body.rigid->rests || speed(number) > kSlow);
-}
-
-bool MatterContacts::wake_met(std::span<BodyState> bodies, std::span<const Frame> frames) const {
-    bool woke = false;
-    for (const Frame& frame : frames)
-        for (const auto& [sleeper, other] : {std::pair(frame.body, frame.other), std::pair(frame.other, frame.body)}) {
-            if (bodies[sleeper].is_absent || !bodies[sleeper].sleeps() || !disturbs(bodies[other], other)) continue;
-            wake(bodies[sleeper]);
-            woke = true;
-        }
-    return woke;
-}
-
-/// A body that sleeps wakes when one that touches it disturbs it.
+/// A body that sleeps wakes when one that is awake touches it.
 bool MatterContacts::wake_touched(std::span<BodyState> bodies) const {
     bool woke = false;
     if (std::ranges::none_of(bodies, &BodyState::sleeps)) return woke;
     for (const Side& side : sides_)
         for (const auto& [sleeper, other] : {std::pair(side.body, side.other), std::pair(side.other, side.body)}) {
-            if (bodies[sleeper].is_absent || !bodies[sleeper].sleeps() || !disturbs(bodies[other], other)) continue;
+            if (bodies[sleeper].is_absent || !bodies[sleeper].sleeps() || bodies[other].sleeps()) continue;
             if (std::ranges::none_of(side.pairs, [](const Pair& pair) { return pair.grasp.holds; })) continue;
             wake(bodies[sleeper]);
             woke = true;
@@ -375,7 +355,7 @@ public:
     }
     void find_points(Index body, const RunContext& context) { points_[body] = surface_places(bodies_[body], context); }
     void find_cells(Index body) {
-        const float reach = kMostReach * float(bodies_[body].body->spacing());
+        const float reach = (kMostReach + (is_rigid(body) ? kMostMargin : 0)) * float(bodies_[body].body->spacing());
         if (!cells_[body]) cells_[body].emplace(*contacts_.matter_[body], bodies_[body].corner_positions(), reach);
     }
 
@@ -383,7 +363,9 @@ public:
     std::span<const Vec3f> points(Index body) const { return points_[body]; } ///< after find_points
     const CellBoxes& cells(Index body) const { return *cells_[body]; }        ///< after find_cells
     /// m: how far outside of a body's cells points may touch it.
-    float outside(Index body) const { return is_rigid(body) ? 0 : kOutside * float(bodies_[body].body->spacing()); }
+    float outside(Index body) const {
+        return (is_rigid(body) ? kMostMargin : kOutside) * float(bodies_[body].body->spacing());
+    }
     /// m, after find_extent of both: points of a body are no nearer to another. Looks no closer where that is `enough`.
     double gap(Index body, Index other, double enough) const {
         const Box &a = extent(body), &b = extent(other);
@@ -555,7 +537,7 @@ MatterContacts::Memory MatterContacts::memory() const {
         for (const Pair& pair : side.pairs)
             memory.pairs.push_back({pair.point, pair.place.cell, pair.anchor.cell,
                                     Index(pair.grasp.holds) + 2 * Index(pair.grasp.slides) + 4 * Index(pair.tangled),
-                                    pair.place.local, pair.anchor.local, pair.entry});
+                                    pair.place.local, pair.anchor.local, pair.entry, pair.rigid_force});
     }
     return memory;
 }
@@ -578,8 +560,11 @@ bool MatterContacts::is_sound(const Memory& memory, std::span<const BodyState> b
         for (Index k = 0; k < side.pairs; ++k, ++from) {
             const PairMemory& pair = memory.pairs[from];
             if (pair.point >= points || pair.cell >= cells) return false;
-            if ((pair.flags & 1) && pair.anchor_cell >= cells) return false;
-            if (!pair.local.allFinite() || !pair.anchor_local.allFinite() || !pair.entry.allFinite()) return false;
+            const bool is_anchored = (pair.flags & 1) && !(bodies[side.body].rigid && bodies[side.other].rigid);
+            if (is_anchored && pair.anchor_cell >= cells) return false;
+            if (!pair.local.allFinite() || !pair.anchor_local.allFinite() || !pair.entry.allFinite() ||
+                !pair.rigid_force.allFinite())
+                return false;
         }
     }
     return from == memory.pairs.size();
@@ -602,7 +587,8 @@ void MatterContacts::set_memory(const Memory& memory, std::span<const BodyState>
                                   .grasp = {(from->flags & 1) != 0, (from->flags & 2) != 0},
                                   .anchor = {from->anchor_cell, from->anchor_local},
                                   .entry = from->entry,
-                                  .tangled = (from->flags & 4) != 0});
+                                  .tangled = (from->flags & 4) != 0,
+                                  .rigid_force = from->rigid_force});
     }
     list_work(bodies);
 }

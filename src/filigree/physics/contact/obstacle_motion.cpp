@@ -46,6 +46,14 @@ double way_of(const Keyed<Vec3d>& keyed, double from, double until) {
     return way;
 }
 
+bool has_jump(const Keyed<Vec3d>& keyed, double from, double until) {
+    for (std::size_t k = 1; k < keyed.times.size(); ++k)
+        if (keyed.times[k] == keyed.times[k - 1] && keyed.times[k] > from && keyed.times[k] <= until &&
+            keyed.values[k] != keyed.values[k - 1])
+            return true;
+    return false;
+}
+
 double furthest_from(const Vec3d& point, std::span<const BodyState> bodies) {
     double squared = 0;
     for (const BodyState& body : bodies)
@@ -59,6 +67,10 @@ double furthest_from(const Vec3d& point, std::span<const BodyState> bodies) {
 MotionRate rate_of(const RigidMotion& motion, double time) {
     return {motion.centre + motion.move.at(time), rate_of(motion.move, time),
             spin_of(motion.angle.at(time), rate_of(motion.angle, time))};
+}
+
+bool jumps_between(const RigidMotion& motion, double from, double until) {
+    return has_jump(motion.move, from, until) || has_jump(motion.angle, from, until);
 }
 
 ObstaclePoses::ObstaclePoses(const World& world, double time) : world_(world) {

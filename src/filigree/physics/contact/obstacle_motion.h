@@ -16,6 +16,9 @@ struct MotionRate {
 /// By the keys' segment that `time` lies in, or that ends there: what has no length, a jump, has no speed.
 MotionRate rate_of(const RigidMotion& motion, double time);
 
+/// Whether keys jump after `from`, up to `until`.
+bool jumps_between(const RigidMotion& motion, double from, double until);
+
 /// How obstacles stand at a moment, and how fast their matter moves.
 class ObstaclePoses {
 public:

@@ -22,25 +22,26 @@ struct Extremes {
 };
 
 /// Largest eigenvalue of the energy density's second derivative in F, over bulk: with the singular values s of F, c of
-/// its cofactor, q = J - rest_ratio, a = 2 shear / (I + 1)^2 its part along s is
-///     a s s^T + c c^T + q M,  M_12 = s_3 ..., plus shear I / (I + 1),
+/// its cofactor, q and e the first and second derivatives of its volume part in J, a = 2 shear / (I + 1)^2 its part
+/// along s is
+///     a s s^T + e c c^T + q M,  M_12 = s_3 ..., plus shear I / (I + 1),
 /// of which trace and Frobenius norm are polynomials in I, |c|^2 and J, and bound the largest eigenvalue (exactly,
 /// where the two others are equal, as at rest). Across s it is at most |q| s_1. Bent cells add little and are bounded
 /// roughly.
 template <int N>
-FILIGREE_INLINE typename LaneTypes<N>::Float stiffness_bound(const Factors& f, const CellShape<N>& shape,
-                                                             typename LaneTypes<N>::Float I,
-                                                             typename LaneTypes<N>::Float inverse_I1) {
+FILIGREE_INLINE typename LaneTypes<N>::Float
+stiffness_bound(const Factors& f, const CellShape<N>& shape, typename LaneTypes<N>::Float I,
+                typename LaneTypes<N>::Float inverse_I1, typename LaneTypes<N>::Float q) {
     using Float = typename LaneTypes<N>::Float;
+    const Float e = 1.0f + (2 * f.crush) * crush_of<N>(shape.J - kCrushSoon);
     const Float c2 = ((dot(shape.cofactor[0], shape.cofactor[0]) + dot(shape.cofactor[1], shape.cofactor[1])) +
                       dot(shape.cofactor[2], shape.cofactor[2])) *
-                     (f.inverse_size2 * f.inverse_size2);
+                     (f.inverse_size2 * f.inverse_size2) * e;
     const Float a = (2 * f.shear_ratio) * inverse_I1 * inverse_I1;
-    const Float q = shape.J - f.rest_ratio;
     const Float aI = a * shape.I_linear;
     const Float trace = aI + c2;
     const Float norm2 = ((aI * aI + c2 * c2) + 2.0f * q * q * shape.I_linear) +
-                        (a * shape.J * (18.0f * shape.J + 12.0f * q) + 4.0f * q * shape.J * shape.I_linear);
+                        (a * shape.J * (18.0f * e * shape.J + 12.0f * q) + 4.0f * e * q * shape.J * shape.I_linear);
     const Float spread = (2.0f / 3.0f) * (norm2 - trace * trace * (1.0f / 3.0f));
     const Float along = trace * (1.0f / 3.0f) + CellLanes<N>::square_root(spread > 0.0f ? spread : Float{});
     const Float across = CellLanes<N>::magnitude(q) * ((shape.I_linear + 3.0f) * 0.28867513f); // s_1 <= sqrt(I)
@@ -68,13 +69,18 @@ FILIGREE_INLINE void add_forces(const Factors& f, const Vectors& positions, cons
     const CellShape<N> shape = shape_of<N>(s, f.inverse_size);
     const Float I = shape.I_linear + shape.I_bent;
     const Float inverse_I1 = 1.0f / (I + 1.0f);
-    Float stiffness = stiffness_bound<N>(f, shape, I, inverse_I1);
+    const Float crush = crush_of<N>(shape.J);
+    const Float q = (shape.J - f.rest_ratio) - f.crush * crush * crush;
+    const Float over = L::least(L::most(shape.I_bent - kBentFrom, Float{}), Float{} + kBentMost);
+    Float stiffness = stiffness_bound<N>(f, shape, I, inverse_I1, q) +
+                      (f.shear_ratio * kBentStiffness) * (over * (over + 4.0f * (kBentFrom + over)));
     stiffness = stiffness <= 3e38f ? stiffness : Float{} + std::numeric_limits<float>::infinity();
 
     const Float share = L::load(fraction + run.first_cell + i);
     const Float linear = share * (I * inverse_I1) * f.shear_force;
-    const Float volume = share * (shape.J - f.rest_ratio) * f.volume_force;
-    const Float bent = linear * (2.0f / 3.0f), last = linear * (1.0f / 3.0f);
+    const Float volume = share * q * f.volume_force;
+    const Float bending = linear + share * (kBentStiffness * f.shear_force) * (over * over);
+    const Float bent = bending * (2.0f / 3.0f), last = bending * (1.0f / 3.0f);
     Vectors3<N> P[8]; // derivatives of the energy by X
     P[1] = linear * s.X[1] + volume * shape.cofactor[0];
     P[2] = linear * s.X[2] + volume * shape.cofactor[1];

@@ -1,4 +1,4 @@
-// What the loops of cell_forces.cpp and cell_sweeps.cpp want to know of a body.
+// What the loops of cell_forces.cpp want to know of a body.
 #include "filigree/physics/fem/cell_kernel.h"
 
 #include "filigree/core/lanes.h"
@@ -37,49 +37,17 @@ void plan_slabs(Plan& plan) {
     }
 }
 
-/// Fills rows, neighbours, row_colors and longest_row.
-void plan_rows(Plan& plan) {
-    const Cells& cells = *plan.cells;
-    for (std::size_t c = 0; c < cells.corners.size(); ++c) {
-        const auto& [i, j, k] = cells.corners[c];
-        if (c > 0 && cells.corners[c - 1] == Cells::LatticeIndex{static_cast<std::uint16_t>(i - 1), j, k}) {
-            ++plan.rows.back().count;
-            continue;
-        }
-        plan.row_colors[(j & 1) + 2 * (k & 1)].push_back(static_cast<Index>(plan.rows.size()));
-        plan.rows.push_back({static_cast<Index>(c), 1, (i & 1) != 0, 0, 0});
-    }
-    const auto row_of = [&](Index corner) {
-        return static_cast<std::size_t>(std::upper_bound(plan.rows.begin(), plan.rows.end(), corner,
-                                                         [](Index c, const Row& row) { return c < row.first_corner; }) -
-                                        plan.rows.begin()) -
-               1;
-    };
-    for (const Cells::Run& run : cells.runs)
-        for (const Index start : run.rows) ++plan.rows[row_of(start)].last_neighbour;
-    std::size_t total = 0;
-    for (Row& row : plan.rows) {
-        row.first_neighbour = total;
-        total += row.last_neighbour;
-        row.last_neighbour = row.first_neighbour;
-        plan.longest_row = std::max<std::size_t>(plan.longest_row, row.count);
-    }
-    plan.neighbours.resize(total);
-    for (std::size_t r = 0; r < cells.runs.size(); ++r)
-        for (std::uint8_t side = 0; side < 4; ++side) {
-            Row& row = plan.rows[row_of(cells.runs[r].rows[side])];
-            plan.neighbours[row.last_neighbour++] = {static_cast<Index>(r), cells.runs[r].rows[side] - row.first_corner,
-                                                     side};
-        }
-}
-
 } // namespace
 
 CellMaterial cell_material(const Material& material, double spacing) {
     const auto [lambda, mu] = lame_parameters(material.young_modulus, material.poisson_ratio);
     const double shear = 4.0 / 3.0 * mu, bulk = lambda + 5.0 / 6.0 * mu;
-    return {static_cast<float>(spacing), static_cast<float>(material.density), static_cast<float>(shear),
-            static_cast<float>(bulk), static_cast<float>(1 + 0.75 * shear / bulk)};
+    return {static_cast<float>(spacing),
+            static_cast<float>(material.density),
+            static_cast<float>(shear),
+            static_cast<float>(bulk),
+            static_cast<float>(1 + 0.75 * shear / bulk),
+            static_cast<float>(double(kCrushStiffness) * (1 + shear / bulk))};
 }
 
 Plan make_plan(const Body& body) {
@@ -89,7 +57,6 @@ Plan make_plan(const Body& body) {
     plan.fraction = body.cells.fraction;
     plan.fraction.resize(plan.fraction.size() + kPadding);
     plan_slabs(plan);
-    plan_rows(plan);
     return plan;
 }
 

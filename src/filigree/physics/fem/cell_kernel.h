@@ -1,9 +1,11 @@
-// The inner loops of the fem material: elastic forces of whole cells and sweeps of vertex block descent, sixteen (or
+// The inner loops of the fem material: elastic forces of whole cells, sixteen (or
 // eight, or four) cells at a time.
 #pragma once
 
 #include "filigree/physics/body.h"
 #include "filigree/physics/body/elasticity.h"
+
+#include <algorithm>
 
 namespace filigree::cell_kernel {
 
@@ -19,36 +21,43 @@ void transform_corners(std::array<Vector, 8>& X) {
             }
 }
 
+/// Below this volume ratio a cell resists more: by (bulk + shear) kCrushStiffness r^2, r = kCrushFrom - J, so that its
+/// stiffness grows steadily from none; below J = 0, where it is inverted, no more than there. Steps are short enough
+/// for a cell that loses kCrushSoon more.
+inline constexpr float kCrushFrom = 0.4f, kCrushStiffness = 100, kCrushSoon = 0.1f;
+/// Where a part of I beyond this is bending, a cell resists more as well: by shear kBentStiffness r^2, r up to
+/// kBentMost. The corners of cells that are hardly filled would be thrown through the others.
+inline constexpr float kBentFrom = 0.02f, kBentStiffness = 500, kBentMost = 0.5f;
+
 /// Energy of a cell of occupied volume V, stable where it is inverted or collapsed [Smith 2018]:
-///     V (shear/2 (I - 3) + bulk/2 (J - rest_ratio)^2 - shear/2 log((I + 1) / 4)) less its value at rest.
-/// I is the mean of |F|^2 over the cell (an exact integral of the trilinear shape), J the determinant of its mean F:
-/// one a cell, so that nothing locks. Small strains see Lame's parameters.
+///     V (shear/2 (I - 3) + bulk/2 (J - rest_ratio)^2 - shear/2 log((I + 1) / 4)) less its value at rest,
+/// crush_energy and bent_energy. I is the mean of |F|^2 over the cell (an exact integral of the trilinear shape), J the
+/// determinant of its mean F: one a cell, so that nothing locks. Small strains see Lame's parameters.
 struct CellMaterial {
     float spacing = 0;         ///< m
     float density = 0;         ///< kg/m^3
     float shear = 0, bulk = 0; ///< Pa: 4/3 mu, lambda + 5/6 mu
     float rest_ratio = 0;      ///< J that the volume term alone would like
+    float crush = 0;           ///< over bulk: kCrushStiffness, of bulk and shear together
 };
 CellMaterial cell_material(const Material& material, double spacing);
+
+/// Of a cell that is crushed, over V bulk.
+inline double crush_energy(const CellMaterial& m, double J) {
+    const double most = double(kCrushFrom), r = std::clamp(most - J, 0.0, most);
+    return double(m.crush) * (r * r * r / 3 + most * most * std::max(-J, 0.0));
+}
+/// Of a cell that is bent, by the part of I that is bending, over V shear.
+inline double bent_energy(double I_bent) {
+    const double over = std::max(I_bent - double(kBentFrom), 0.0), r = std::min(over, double(kBentMost));
+    return double(kBentStiffness) * (r * r * r / 6 + r * r * (over - r) / 2);
+}
 
 /// Layers of cells whose forces one thread adds up by itself. Neighbours share one layer of corners, so slabs of equal
 /// parity share none.
 struct Slab {
     std::size_t first_run, last_run;     ///< [first, last)
     std::size_t first_layer, last_layer; ///< of corners, both included
-};
-
-/// Corners beside each other along x, as many as there are without a gap: what a sweep moves at a time.
-struct Row {
-    Index first_corner, count;
-    bool odd_start;                              ///< parity of the first corner's lattice x
-    std::size_t first_neighbour, last_neighbour; ///< [first, last) of Plan::neighbours
-};
-
-/// A run with corners in a row: which of its four rows that is, and where in the row the run starts.
-struct Neighbour {
-    Index run, offset;
-    std::uint8_t side; ///< index into Run::rows
 };
 
 /// Everything about a body that the loops want and that does not change.
@@ -59,10 +68,6 @@ struct Plan {
     std::vector<std::size_t> layer_starts; ///< first corner of each layer; one more at the end
     std::vector<std::size_t> run_layers;   ///< of each run's lower corners
     std::vector<Slab> slabs;
-    std::vector<Row> rows;
-    std::vector<Neighbour> neighbours;
-    std::array<std::vector<Index>, 4> row_colors; ///< rows by the parities of their j and k
-    std::size_t longest_row = 0;
 };
 Plan make_plan(const Body& body);
 
@@ -76,14 +81,10 @@ struct Sums {
 ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces, Sums& sums,
                      const RunContext& context);
 
-/// Elasticity::sweep, in the same order on any processor.
-void sweep(const Plan& plan, Vectors& positions, const Descent& descent, const RunContext& context);
-
-/// Cells at a time that this processor has an implementation for, ascending; forces and sweep take the fastest.
+/// Cells at a time that this processor has an implementation for, ascending; forces takes the fastest.
 std::span<const int> lane_counts();
 /// The same by one of them, so that tests can hold them against each other.
 ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces, Sums& sums, int lanes,
                      const RunContext& context);
-void sweep(const Plan& plan, Vectors& positions, const Descent& descent, int lanes, const RunContext& context);
 
 } // namespace filigree::cell_kernel

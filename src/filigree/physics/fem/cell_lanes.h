@@ -157,12 +157,20 @@ FILIGREE_INLINE CellShape<N> shape_of(const CellSums<N>& sums, float inverse_siz
     return shape;
 }
 
+/// Of crushed cells: kCrushFrom - J, from 0 to what it is where a cell is flat.
+template <int N>
+FILIGREE_INLINE typename LaneTypes<N>::Float crush_of(typename LaneTypes<N>::Float J) {
+    using Float = typename LaneTypes<N>::Float;
+    return CellLanes<N>::least(CellLanes<N>::most(kCrushFrom - J, Float{}), Float{} + kCrushFrom);
+}
+
 /// Constants of a material as the loops want them; size = 4 h.
 struct Factors {
     float inverse_size, inverse_size2, inverse_size3;
     float shear, bulk; ///< Pa
     float rest_ratio;
     float shear_ratio;  ///< shear / bulk
+    float crush;        ///< of CellMaterial
     float rate;         ///< from an eigenvalue of the energy density in F, over bulk, to 1/s^2
     float shear_force;  ///< of X: shear h / 16
     float volume_force; ///< of the cofactor: bulk h^3 / (4 h)^3
@@ -175,6 +183,7 @@ struct Factors {
         bulk = m.bulk;
         rest_ratio = m.rest_ratio;
         shear_ratio = m.shear / m.bulk;
+        crush = m.crush;
         rate = 1.0001f * 4 * m.bulk / (m.density * m.spacing * m.spacing);
         shear_force = m.shear * m.spacing / 16;
         volume_force = m.bulk / 64;

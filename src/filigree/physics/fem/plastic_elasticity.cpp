@@ -7,7 +7,6 @@
 #include "filigree/physics/body.h"
 #include "filigree/physics/fem/cell_kernel.h"
 #include "filigree/physics/fem/plastic_cells.h"
-#include "filigree/physics/fem/vertex_block.h"
 #include "filigree/physics/step/byte_stream.h"
 
 #include <algorithm>
@@ -19,14 +18,6 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kPlasticGrain = 256;
-
-/// +1 or -1 of a corner in a sum.
-float sign_of(int corner, int sum) {
-    float sign = 1;
-    for (int bit = 1; bit < 8; bit *= 2)
-        if (sum & bit && !(corner & bit)) sign = -sign;
-    return sign;
-}
 
 /// What the energy of a cell depends on, by its elastic sums.
 struct ElasticShape {
@@ -49,18 +40,30 @@ float largest_eigenvalue(float trace, float squares) {
     return trace / 3 + std::sqrt(std::max((2.0f / 3) * (squares - trace * trace / 3), 0.0f));
 }
 
+/// cell_kernel's crush, and the first derivative of the volume's energy density over `bulk`.
+float crush_of(float J) { return std::clamp(cell_kernel::kCrushFrom - J, 0.0f, cell_kernel::kCrushFrom); }
+float pressure_of(const cell_kernel::CellMaterial& m, float J) {
+    const float crush = crush_of(J);
+    return J - m.rest_ratio - m.crush * crush * crush;
+}
+
+float over_bent(float I_bent) { return std::clamp(I_bent - cell_kernel::kBentFrom, 0.0f, cell_kernel::kBentMost); }
+
 /// A bound on the second derivative of the energy density over `bulk`: cell_kernel's in the elastic sums, brought back
 /// through what the cell keeps. Bending at rest couples sums of equal shear stiffness.
 float stiffness_of(const cell_kernel::CellMaterial& m, const PlasticCell& cell, const ElasticShape& shape, float size) {
     const float I = shape.linear + shape.bent, ratio = m.shear / m.bulk;
-    const float c2 = shape.cofactors.squaredNorm() / (size * size * size * size);
-    const float a = 2 * ratio / ((I + 1) * (I + 1)), q = shape.J - m.rest_ratio;
+    const float e = 1 + 2 * m.crush * crush_of(shape.J - cell_kernel::kCrushSoon), q = pressure_of(m, shape.J);
+    const float c2 = e * shape.cofactors.squaredNorm() / (size * size * size * size);
+    const float a = 2 * ratio / ((I + 1) * (I + 1));
     const float trace = a * shape.linear + c2;
     const float squares = a * shape.linear * a * shape.linear + c2 * c2 + 2 * q * q * shape.linear +
-                          a * shape.J * (18 * shape.J + 12 * q) + 4 * q * shape.J * shape.linear;
+                          a * shape.J * (18 * e * shape.J + 12 * q) + 4 * e * q * shape.J * shape.linear;
     const float along = largest_eigenvalue(trace, squares);
     const float across = std::abs(q) * (shape.linear + 3) * 0.28867513f;
-    const float shear = ratio * I / (I + 1), bent = a * (0.05f * shape.linear + 4 * shape.bent);
+    const float over = over_bent(shape.bent),
+                over_stiffness = cell_kernel::kBentStiffness * over * (over + 4 * (cell_kernel::kBentFrom + over));
+    const float shear = ratio * (I / (I + 1) + over_stiffness), bent = a * (0.05f * shape.linear + 4 * shape.bent);
     const Mat3f metric = cell.inverse * cell.inverse.transpose();
     float at_rest = 0;
     for (const Vec3f& b : cell.bent) at_rest += b.squaredNorm();
@@ -78,10 +81,6 @@ public:
         for (auto& around : cells_at_) around.fill(kNoIndex);
         for (Index cell = 0; cell < cells.cells.size(); ++cell)
             for (int corner = 0; corner < 8; ++corner) cells_at_[cells.cell_corners[cell][corner]][corner] = cell;
-        for (Index corner = 0; corner < cells.corners.size(); ++corner) {
-            const auto& at = cells.corners[corner];
-            colors_[(at[0] & 1) + 2 * (at[1] & 1) + 4 * (at[2] & 1)].push_back(corner);
-        }
     }
 
     ElasticReport forces(const Vectors& positions, Vectors& forces, const RunContext& context) override {
@@ -102,20 +101,6 @@ public:
         ElasticReport all{0, std::numeric_limits<float>::infinity(), 0};
         for (const ElasticReport& report : found) take_worse(all, report);
         return all;
-    }
-
-    /// Corners whose places have the same parities share no cell.
-    void sweep(Vectors& positions, const Descent& descent, const RunContext& context) override {
-        for (const std::vector<Index>& color : colors_)
-            parallel_for(context, color.size(), kPlasticGrain / 4, [&](std::size_t begin, std::size_t end) {
-                for (std::size_t n = begin; n < end; ++n) move_corner(positions, descent, color[n]);
-            });
-    }
-
-    void add_block(Index particle, const Vectors& positions, Vec3f& force, Symmetric3& block) const override {
-        for (int side = 0; side < 8; ++side)
-            if (const Index cell = cells_at_[particle][side]; cell != kNoIndex)
-                add_cell(cell, side, positions, force, block);
     }
 
     double energy(const Vectors& positions, const RunContext& context) const override {
@@ -187,7 +172,10 @@ private:
         const float I = shape.linear + shape.bent, h = material_.spacing;
         const float volume = body_.cells.fraction[cell] * h * h * h;
         const float by_sums = volume * material_.shear * I / (I + 1) / (size_ * size_);
-        const float by_volume = volume * material_.bulk * (shape.J - material_.rest_ratio) / (size_ * size_ * size_);
+        const float by_volume = volume * material_.bulk * pressure_of(material_, shape.J) / (size_ * size_ * size_);
+        const float over = over_bent(shape.bent);
+        const float by_bent =
+            by_sums + volume * material_.shear * cell_kernel::kBentStiffness * over * over / (size_ * size_);
         CellSums P; // derivatives of the energy by the sums
         P[0] = Vec3f::Zero();
         Mat3f linear;
@@ -195,7 +183,7 @@ private:
             linear.col(a) = by_sums * shape.X[kLinearSums[a]] + by_volume * shape.cofactors.col(a);
         linear *= plastic.inverse.transpose();
         for (int b = 0; b < 4; ++b) {
-            P[kBentSums[b]] = by_sums * kSumShares[kBentSums[b]] * shape.X[kBentSums[b]];
+            P[kBentSums[b]] = by_bent * kSumShares[kBentSums[b]] * shape.X[kBentSums[b]];
             linear -= P[kBentSums[b]] * plastic.bent[b].transpose();
         }
         for (int a = 0; a < 3; ++a) P[kLinearSums[a]] = linear.col(a);
@@ -213,57 +201,25 @@ private:
                             std::sqrt(I / 3)});
     }
 
-    /// Adds one cell's force on one of its corners, and the block there.
-    void add_cell(Index cell, int corner, const Vectors& positions, Vec3f& force, Symmetric3& block) const {
-        const ElasticShape shape = shape_of(cell, positions);
-        const PlasticCell& plastic = plastic_[cell];
-        const Vec3f signs(sign_of(corner, 1), sign_of(corner, 2), sign_of(corner, 4));
-        const Vec3f elastic_signs = plastic.inverse.transpose() * signs;
-        float squares = 0;
-        Vec3f by_I = Vec3f::Zero(), by_J = Vec3f::Zero(); // half of dI/dx; dJ/dx
-        const auto add = [&](int sum, float sign) {
-            squares += kSumShares[sum] * sign * sign / (size_ * size_);
-            by_I += kSumShares[sum] * sign / (size_ * size_) * shape.X[sum];
-        };
-        for (int a = 0; a < 3; ++a) {
-            add(kLinearSums[a], elastic_signs[a]);
-            by_J += elastic_signs[a] / (size_ * size_ * size_) * shape.cofactors.col(a);
-        }
-        for (int b = 0; b < 4; ++b) add(kBentSums[b], sign_of(corner, kBentSums[b]) - signs.dot(plastic.bent[b]));
-        const float I = shape.linear + shape.bent, h = material_.spacing;
-        const float volume = body_.cells.fraction[cell] * h * h * h, shear = material_.shear * I / (I + 1);
-        force -= volume * (shear * by_I + material_.bulk * (shape.J - material_.rest_ratio) * by_J);
-        block.add_scaled_identity(volume * shear * squares);
-        block.add_outer(by_I, volume * 2 * material_.shear / ((I + 1) * (I + 1)));
-        block.add_outer(by_J, volume * material_.bulk);
-    }
-
-    void move_corner(Vectors& positions, const Descent& descent, Index corner) const {
-        if (descent.fixed[corner]) return;
-        Vec3f force = descent.inertia[corner] * (descent.target[corner] - positions[corner]);
-        Symmetric3 block;
-        block.add_scaled_identity(descent.inertia[corner]);
-        add_block(corner, positions, force, block);
-        if (descent.touched[corner] && descent.external) descent.external->add(corner, positions, force, block);
-        positions.add(corner, block.solve(force));
-    }
-
     double energy_of(std::size_t cell, const Vectors& positions) const {
         const CellSums X = plastic_[cell].elastic(cell_sums(positions, body_.cells.cell_corners[cell]));
         const double size = double(size_), h = double(material_.spacing), g = double(material_.rest_ratio);
-        double I = 0;
-        for (int m = 1; m < 8; ++m) I += double(kSumShares[m]) * X[m].cast<double>().squaredNorm() / (size * size);
+        const auto square = [&](int m) {
+            return double(kSumShares[m]) * X[m].cast<double>().squaredNorm() / (size * size);
+        };
+        double I = 0, bent = 0;
+        for (int m = 1; m < 8; ++m) I += square(m);
+        for (const int m : kBentSums) bent += square(m);
         const double J = X[1].cast<double>().dot(X[2].cast<double>().cross(X[4].cast<double>())) / (size * size * size);
         return double(body_.cells.fraction[cell]) * h * h * h *
-               (0.5 * double(material_.shear) * ((I - 3) - std::log1p((I - 3) / 4)) +
-                0.5 * double(material_.bulk) * (J - 1) * (J + 1 - 2 * g));
+               (double(material_.shear) * (0.5 * ((I - 3) - std::log1p((I - 3) / 4)) + cell_kernel::bent_energy(bent)) +
+                double(material_.bulk) * (0.5 * (J - 1) * (J + 1 - 2 * g) + cell_kernel::crush_energy(material_, J)));
     }
 
     const Body& body_;
     const cell_kernel::CellMaterial material_;
     const float size_;                           ///< m: 4 h
     std::vector<std::array<Index, 8>> cells_at_; ///< of each corner, the cell in which it is the n-th
-    std::array<std::vector<Index>, 8> colors_;   ///< corners by the parities of their places
     std::vector<PlasticCell> plastic_;           ///< state
     std::vector<std::array<Vec3f, 8>> pushes_;   ///< scratch: N, of each cell on its corners
 };

@@ -7,6 +7,7 @@
 
 #include "filigree/physics/contact/obstacle_motion.h"
 #include "filigree/physics/contact/pair_laws.h"
+#include "filigree/physics/grid/mpm_barriers.h"
 #include "filigree/physics/grid/mpm_grid.h"
 #include "filigree/physics/grid/mpm_kernel.h"
 #include "filigree/physics/matter_particles.h"
@@ -27,8 +28,10 @@ public:
     bool has(std::size_t actor) const { return field_of_[actor] != kNoIndex; }
     std::size_t particle_count(std::size_t actor) const;
 
-    /// Steps until a time. Breaks off when cancelled.
-    void advance(double from, double until, FrameReport& report, const RunContext& context);
+    /// s: the longest step that is stable, and in which nothing goes far, from this time on.
+    float longest_step(double now, const RunContext& context) const;
+    void step(double from, double until, const RunContext& context); ///< s
+    float least_volume_ratio(std::size_t actor) const;               ///< smallest J of its particles
 
     /// Where the particles of a body are, and how fast.
     void read(std::size_t actor, Vectors& positions, Vectors& velocities) const;
@@ -36,7 +39,13 @@ public:
     void set_positions(std::size_t actor, const Vectors& positions);
     void set_velocities(std::size_t actor, const Vectors& velocities);
     void set_velocity_gradient(std::size_t actor, const Mat3f& gradient); ///< 1/s, of all its particles
-    void begin_pins();                                                    ///< once, when particles are where they begin
+    /// Adds forces, N, one a particle, for so long, s.
+    void kick(std::size_t actor, const Vectors& forces, float dt);
+    /// Particles that go as they are told and not as the grid has it: those whose byte is not 0. Once.
+    void set_fixed(std::size_t actor, std::span<const std::uint8_t> fixed);
+    void move_fixed(std::size_t actor, const Vectors& positions, const Vectors& velocities); ///< these alone
+    /// 1/s^2, of the body's stiffness on the grid: ElasticReport::squared_frequency at rest, as it were.
+    float rest_squared_frequency(std::size_t actor) const;
     /// Takes lost particles from these, and makes whatever else a particle of the body carries finite. is_lost: of
     /// each. Returns how many particles were changed.
     std::size_t repair(std::size_t actor, const Vectors& positions, const Vectors& velocities,
@@ -67,14 +76,20 @@ private:
     Vec3f emptiness(const AtParticle& found, std::size_t field) const;
     Particle at_rest(float mass, float volume, std::size_t field) const; ///< at the origin
     void find_surfaces(std::span<const Actor> actors);
-    float longest_step(const RunContext& context) const; ///< s
+    float longest_step_beside_obstacles(double now) const; ///< s
+    void find_shadows(const RunContext& context);
     void scatter(float dt, const RunContext& context);
     void update_nodes(float dt, double time, const RunContext& context);
     void hold_nodes();
     void gather(float dt, double time, const RunContext& context);
+    bool is_held(std::uint32_t number) const {
+        return shadow_of_[number] != kNoIndex && shadows_[shadow_of_[number]].held;
+    }
+    AtParticle gather_beside(std::uint32_t number, const Node* tile, const Node* behind) const;
+    void move(std::uint32_t number, const Vec3f& way, const Barriers::Near& walls);
     void move_tracers(float dt, const RunContext& context);
-    void add_forces(float dt, double time);
-    void hold_pinned(double time);
+    void move_tracer(Tracer& tracer, float dt, const Barriers::Near& walls) const;
+    void blow(Particle& particle, const Vec3f& emptiness, float surface, const Vec3f& wind, float dt) const;
 
     const World& world_;
     const PairLaws laws_;
@@ -88,10 +103,15 @@ private:
     std::vector<float> grid_mass_;      ///< kg, of a full node, by field
     std::vector<float> surface_;        ///< by field: area of the body at rest, in parts of what its particles tell
     std::vector<Tracer> tracers_;
-    std::vector<std::vector<Vec3f>> pinned_from_; ///< of each pin of these bodies
+    std::vector<std::uint32_t> fixed_; ///< particles
+    const float spacing_;              ///< of particles, m
     Grid grid_;
-    float spacing_ = 0; ///< of particles, m
-    bool has_heat_ = false, has_pins_ = false;
+    Barriers barriers_;
+    std::vector<Shadow> shadows_;
+    /// By particle: what walls hide from it, and the number of its shadow. Empty: there are no walls.
+    std::vector<std::uint32_t> hidden_, shadow_of_;
+    float approach_ = 0; ///< m/s, of bodies at nodes in the last step
+    bool has_heat_ = false;
     std::vector<Float4> pinned_; ///< momentum and mass that are pinned, of each node
 };
 

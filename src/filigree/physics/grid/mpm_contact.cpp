@@ -2,6 +2,7 @@
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/smoothstep.h"
+#include "filigree/physics/grid/mpm_barriers.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,12 +12,20 @@ namespace filigree::mpm {
 namespace {
 
 constexpr double kGrownTogether = 0.25f; ///< share of matter that has melted, from which on bodies are one
-constexpr float kLeastMass = 1e-7f;      ///< of the heavier body's at a node: less of another is not felt
+/// Where bodies were driven into each other there is more matter than has room, and normals lean anyhow: they are one,
+/// so that they do not pass.
+constexpr double kCrowded = 1.25, kStuck = 1.75; ///< times the mass of a full node
+constexpr float kLeastMass = 1e-7f;              ///< of the heavier body's at a node: less of another is not felt
 
-/// Mass of a body at a node of the grid.
+/// Mass of a body at a node of the grid, on both sides of walls.
 float mass_at(const Grid& grid, const std::array<int, 3>& node, std::uint32_t body) {
-    const std::size_t index = grid.node_index(node, body);
-    return index == Grid::kNoNode ? 0 : grid.node(index).motion[3];
+    float mass = 0;
+    for (const std::uint32_t side : {body & ~kBehind, body | kBehind}) {
+        if (side & kBehind && !grid.has_behind()) continue;
+        const std::size_t index = grid.node_index(node, side);
+        if (index != Grid::kNoNode) mass += grid.node(index).motion[3];
+    }
+    return mass;
 }
 
 std::array<int, 3> node_of(const BlockPlace& place, int n) {
@@ -35,29 +44,18 @@ Vec3f mass_gradient(const Grid& grid, const std::array<int, 3>& node, std::uint3
     return gradient;
 }
 
-Vec3f velocity_of(const Node& node) { return {node.motion[0], node.motion[1], node.motion[2]}; }
-void set_velocity(Node& node, const Vec3f& velocity) {
-    for (int k = 0; k < 3; ++k) node.motion[k] = velocity[k];
-}
-
-/// What is left of a velocity relative to something with this outward normal, by Coulomb's law. inward: m/s.
-Vec3f after_contact(const Vec3f& relative, const Vec3f& normal, float friction) {
-    const float inward = -relative.dot(normal);
-    if (!(inward > 0)) return relative;
-    const Vec3f along = relative + inward * normal;
-    const float speed = along.norm();
-    return speed > 0 ? Vec3f(along * std::max(0.0f, 1 - friction * inward / speed)) : along;
-}
-
 } // namespace
 
-NodeContacts::NodeContacts(const Grid& grid, const World& world, const PairLaws& laws,
-                           std::span<const std::size_t> actors, const RunContext& context)
-    : world_(world), laws_(laws), actors_(actors) {
+NodeContacts::NodeContacts(const Grid& grid, const World& world, const Barriers& barriers, const PairLaws& laws,
+                           std::span<const std::size_t> actors, std::span<const float> full_mass,
+                           const RunContext& context)
+    : world_(world), barriers_(barriers), laws_(laws), actors_(actors), full_mass_(full_mass) {
     for (std::uint32_t b = 0; b < grid.block_count(); ++b) {
         const BlockPlace& here = grid.place(b);
         const BlockPlace* before = b > 0 ? &grid.place(b - 1) : nullptr;
-        if (!before || before->x != here.x || before->y != here.y || before->z != here.z) first_block_.push_back(b);
+        if (!before || before->x != here.x || before->y != here.y || before->z != here.z ||
+            (before->body ^ here.body) & kBehind)
+            first_block_.push_back(b);
         blocks_.push_back(b);
     }
     first_block_.push_back(std::uint32_t(blocks_.size()));
@@ -86,21 +84,24 @@ NodeContacts::NodeContacts(const Grid& grid, const World& world, const PairLaws&
     });
 }
 
-void NodeContacts::act(Grid& grid, const ObstaclePoses& poses, const RunContext& context) const {
+float NodeContacts::act(Grid& grid, const ObstaclePoses& poses, const RunContext& context) const {
+    std::vector<float> approach(place_count());
     parallel_for(context, place_count(), 8, [&](std::size_t begin, std::size_t end) {
         for (std::size_t place = begin; place < end; ++place) {
-            meet_bodies(grid, place);
+            approach[place] = meet_bodies(grid, place);
             meet_obstacles(grid, place, poses);
         }
     });
+    return approach.empty() ? 0 : *std::ranges::max_element(approach);
 }
 
-void NodeContacts::meet_bodies(Grid& grid, std::size_t place) const {
+float NodeContacts::meet_bodies(Grid& grid, std::size_t place) const {
     const std::span<const std::uint32_t> here = blocks(place);
-    if (here.size() < 2) return;
+    if (here.size() < 2) return 0;
     std::size_t next = 0;
+    float approach = 0;
     for (int n = 0; n < kBlockNodes; ++n) {
-        float mass = 0, melted = 0, heaviest = 0;
+        float mass = 0, melted = 0, heaviest = 0, fullness = 0;
         std::size_t with_mass = 0;
         Vec3f momentum = Vec3f::Zero();
         for (const std::uint32_t block : here) {
@@ -109,24 +110,32 @@ void NodeContacts::meet_bodies(Grid& grid, std::size_t place) const {
             if (!(m > 0)) continue;
             ++with_mass;
             mass += m;
+            fullness += m / full_mass_[grid.place(block).body & ~kBehind];
             heaviest = std::max(heaviest, m);
             melted += m * node.matter[2];
             momentum += m * velocity_of(node);
         }
         if (with_mass < 2) continue;
         const Vec3f common = momentum / mass;
-        const auto one = float(smoothstep(0, kGrownTogether, double(melted / mass)));
+        const auto one = float(std::max(smoothstep(0, kGrownTogether, double(melted / mass)),
+                                        smoothstep(kCrowded, kStuck, double(fullness))));
         for (std::size_t k = 0; k < here.size(); ++k) {
             Node& node = grid.nodes(here[k])[n];
             const Vec3f& normal = normals_[place][next + k];
             if (!(node.motion[3] > 0)) continue;
             Vec3f own = velocity_of(node);
-            if (heaviest * kLeastMass < mass - node.motion[3] && !normal.isZero())
-                own = common + after_contact(own - common, -normal, friction_of(grid, here, k, n));
+            const bool meets = heaviest * kLeastMass < mass - node.motion[3] && !normal.isZero();
+            if (meets) approach = std::max(approach, (own - common).dot(normal));
+            if (meets) own = common + after_contact(own - common, -normal, friction_of(grid, here, k, n));
             set_velocity(node, own + one * (common - own));
         }
         next += here.size();
     }
+    return approach;
+}
+
+std::size_t NodeContacts::actor_of(const Grid& grid, std::uint32_t block) const {
+    return actors_[grid.place(block).body & ~kBehind];
 }
 
 /// Between a body and those it meets at a node: the mean of its pairs', by the others' mass there.
@@ -135,7 +144,7 @@ float NodeContacts::friction_of(const Grid& grid, std::span<const std::uint32_t>
     for (std::size_t other = 0; other < here.size(); ++other) {
         const auto m = double(grid.nodes(here[other])[node].motion[3]);
         if (other == k || !(m > 0)) continue;
-        sum += m * laws_.of(actors_[grid.place(here[k]).body], actors_[grid.place(here[other]).body]).friction;
+        sum += m * laws_.of(actor_of(grid, here[k]), actor_of(grid, here[other])).friction;
         mass += m;
     }
     return mass > 0 ? float(sum / mass) : 0.0f;
@@ -147,6 +156,7 @@ void NodeContacts::meet_obstacles(Grid& grid, std::size_t place, const ObstacleP
     const BlockPlace& at = grid.place(here.front());
     const Vec3f middle = h * (Vec3f(float(at.x), float(at.y), float(at.z)) * kBlockSide + Vec3f::Constant(1.5f));
     for (std::size_t o = 0; o < world_.obstacles.size(); ++o) {
+        if (barriers_.has(o)) continue;
         const Obstacle& obstacle = world_.obstacles[o];
         const float reach = 1.5f * std::sqrt(3.0f) * h;
         if (!(poses.distance_to(o, middle).distance < reach)) continue;
@@ -196,6 +206,12 @@ void HeatExchange::add_source(const HeatSource& source, double time, std::span<c
     }
 }
 
+/// Of a mesh that is a room, from its walls.
+float HeatExchange::distance_from(std::size_t obstacle, const Vec3f& point, const ObstaclePoses& poses) const {
+    const float distance = poses.distance_to(obstacle, point).distance;
+    return std::holds_alternative<MeshObstacle>(world_.obstacles[obstacle].shape) ? std::abs(distance) : distance;
+}
+
 void HeatExchange::go_to(const BlockPlace& place, const ObstaclePoses& poses, std::vector<std::size_t>& near) const {
     // Particles whose stencils begin in the block were within two cells of its middle along each axis, and have gone on
     // for less than one since.
@@ -204,7 +220,7 @@ void HeatExchange::go_to(const BlockPlace& place, const ObstaclePoses& poses, st
                               Vec3f::Constant(0.5f * kBlockSide + 0.5f));
     near.clear();
     for (std::size_t o = 0; o < world_.obstacles.size(); ++o)
-        if (world_.obstacles[o].heat_transfer > 0 && poses.distance_to(o, middle).distance < reach) near.push_back(o);
+        if (world_.obstacles[o].heat_transfer > 0 && distance_from(o, middle, poses) < reach) near.push_back(o);
 }
 
 void HeatExchange::act(Particle& p, const Matter& matter, float emptiness, float surface, const ObstaclePoses& poses,
@@ -221,7 +237,7 @@ void HeatExchange::act(Particle& p, const Matter& matter, float emptiness, float
     if (world_.air_heat_transfer > 0) exchange(air_temperature_, world_.air_heat_transfer, area);
     for (const std::size_t o : near) {
         const Obstacle& obstacle = world_.obstacles[o];
-        if (!(poses.distance_to(o, point).distance < grid_spacing_)) continue;
+        if (!(distance_from(o, point, poses) < grid_spacing_)) continue;
         exchange(obstacle_temperature_[o], obstacle.heat_transfer, volume / grid_spacing_);
     }
     for (const Source& source : sources_)

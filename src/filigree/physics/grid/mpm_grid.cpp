@@ -50,8 +50,34 @@ std::uint32_t Grid::insert(const BlockPlace& place) {
     return entry;
 }
 
+/// The blocks that particles' stencils reach. Returns 1 for each that there was from whose particles a node is hidden.
+std::vector<std::uint8_t> Grid::insert_around(std::span<const std::uint32_t> hidden) {
+    const std::size_t with_particles = places_.size();
+    std::vector<std::uint8_t> hides(with_particles, 0);
+    for (std::size_t p = 0; p < hidden.size(); ++p) hides[block_of_particle_[p]] |= hidden[p] != 0;
+    has_behind_ = std::ranges::count(hides, 1) > 0;
+    for (std::size_t b = 0; b < with_particles; ++b)
+        for (int k = 0; k < 8; ++k) {
+            BlockPlace next = places_[b];
+            next.x += k & 1;
+            next.y += k >> 1 & 1;
+            next.z += k >> 2 & 1;
+            if (k > 0) insert(next);
+            next.body |= kBehind;
+            if (hides[b]) insert(next);
+        }
+    return hides;
+}
+
+std::array<Index, 8> Grid::blocks_around(const BlockPlace& place) const {
+    std::array<Index, 8> around;
+    for (int k = 0; k < 8; ++k)
+        around[std::size_t(k)] = find({place.x + (k & 1), place.y + (k >> 1 & 1), place.z + (k >> 2 & 1), place.body});
+    return around;
+}
+
 void Grid::begin(std::span<const Particle> particles, std::span<const std::uint32_t> bodies,
-                 const RunContext& context) {
+                 std::span<const std::uint32_t> hidden, const RunContext& context) {
     found_.resize(particles.size());
     parallel_for(context, particles.size(), kParticleGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t p = begin; p < end; ++p)
@@ -62,15 +88,7 @@ void Grid::begin(std::span<const Particle> particles, std::span<const std::uint3
     block_of_particle_.resize(particles.size());
     for (std::size_t p = 0; p < particles.size(); ++p)
         block_of_particle_[p] = p > 0 && found_[p] == found_[p - 1] ? block_of_particle_[p - 1] : insert(found_[p]);
-    const std::size_t with_particles = places_.size();
-    for (std::size_t b = 0; b < with_particles; ++b)
-        for (int k = 1; k < 8; ++k) {
-            BlockPlace next = places_[b];
-            next.x += k & 1;
-            next.y += k >> 1 & 1;
-            next.z += k >> 2 & 1;
-            insert(next);
-        }
+    const std::vector<std::uint8_t> hides = insert_around(hidden);
 
     std::vector<std::uint32_t> sorted(places_.size()), rank(places_.size());
     for (std::uint32_t b = 0; b < sorted.size(); ++b) sorted[b] = b;
@@ -88,13 +106,17 @@ void Grid::begin(std::span<const Particle> particles, std::span<const std::uint3
     for (std::uint32_t p = 0; p < particles.size(); ++p) order_[next[block_of_particle_[p]]++] = p;
 
     around_.resize(places_.size());
+    if (has_behind_) behind_.assign(places_.size(), kNoIndex);
     for (auto& group : groups_) group.clear();
     for (std::uint32_t b = 0; b < places_.size(); ++b) {
         if (first_particle_[b] == first_particle_[b + 1]) continue;
         const BlockPlace& place = places_[b];
         groups_[(place.x & 1) + 2 * (place.y & 1) + 4 * (place.z & 1)].push_back(b);
-        for (int k = 0; k < 8; ++k)
-            around_[b][k] = find({place.x + (k & 1), place.y + (k >> 1 & 1), place.z + (k >> 2 & 1), place.body});
+        around_[b] = blocks_around(place);
+        if (!hides[sorted[b]]) continue;
+        const BlockPlace hiding = {place.x, place.y, place.z, place.body | kBehind};
+        behind_[b] = find(hiding);
+        around_[behind_[b]] = blocks_around(hiding);
     }
     nodes_.resize(places_.size() * kBlockNodes);
     parallel_for(context, places_.size(), kBlockGrain, [&](std::size_t begin, std::size_t end) {

@@ -20,11 +20,18 @@ inline constexpr int kTileSide = kBlockSide + 2, kTileNodes = kTileSide * kTileS
 struct Node {
     Float4 motion = {}, matter = {};
 };
+inline Vec3f velocity_of(const Node& node) { return {node.motion[0], node.motion[1], node.motion[2]}; }
+inline void set_velocity(Node& node, const Vec3f& velocity) {
+    for (int k = 0; k < 3; ++k) node.motion[k] = velocity[k];
+}
+
+/// With a body's number: of its matter that a wall hides a node from, in a place of its own.
+inline constexpr std::uint32_t kBehind = 1u << 31;
 
 /// Where a block is, and whose.
 struct BlockPlace {
     std::int32_t x, y, z; ///< its first node, in blocks
-    std::uint32_t body;
+    std::uint32_t body;   ///< or one with kBehind
     auto operator<=>(const BlockPlace&) const = default;
 };
 
@@ -60,7 +67,9 @@ public:
     explicit Grid(float spacing) : spacing_(spacing) {}
 
     /// Sorts particles into blocks, and makes the blocks that they reach; all nodes are zero. bodies: of each particle.
-    void begin(std::span<const Particle> particles, std::span<const std::uint32_t> bodies, const RunContext& context);
+    /// hidden: of each, what of its nodes is behind walls; none: nothing of any.
+    void begin(std::span<const Particle> particles, std::span<const std::uint32_t> bodies,
+               std::span<const std::uint32_t> hidden, const RunContext& context);
 
     float spacing() const { return spacing_; }
     std::size_t block_count() const { return places_.size(); }
@@ -73,6 +82,9 @@ public:
     }
     /// Blocks with particles, in eight groups: those of one group share no node with each other's tiles.
     const std::array<std::vector<std::uint32_t>, 8>& groups() const { return groups_; }
+    /// Of a block with particles: the block behind walls, kNoIndex where nothing is hidden.
+    Index behind(std::size_t block) const { return has_behind_ ? behind_[block] : kNoIndex; }
+    bool has_behind() const { return has_behind_; }
     /// The block, kNoIndex where there is none.
     Index find(const BlockPlace& place) const;
 
@@ -101,6 +113,8 @@ private:
     void each_part(std::size_t block, const Visit& visit) const;
     std::size_t slot(const BlockPlace& place) const;
     std::uint32_t insert(const BlockPlace& place);
+    std::vector<std::uint8_t> insert_around(std::span<const std::uint32_t> hidden);
+    std::array<Index, 8> blocks_around(const BlockPlace& place) const;
 
     float spacing_;
     std::vector<BlockPlace> places_;
@@ -109,6 +123,8 @@ private:
     std::vector<std::uint32_t> order_, first_particle_, block_of_particle_;
     std::array<std::vector<std::uint32_t>, 8> groups_;
     std::vector<BlockPlace> found_;
+    std::vector<Index> behind_;
+    bool has_behind_ = false;
     std::vector<std::uint32_t> table_; ///< open addressing, of places_; kNoIndex: free
 };
 

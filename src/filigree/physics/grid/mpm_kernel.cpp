@@ -53,7 +53,7 @@ FILIGREE_INLINE void fetch(const Particle* particles, std::span<const std::uint3
 
 template <int N>
 FILIGREE_INLINE void scatter(std::span<const std::uint32_t> numbers, const Particle* particles, const Matter& matter,
-                             float h, float dt, Node* tile) {
+                             float h, float dt, Node* tile, const BehindWalls& behind) {
     using E = Eight<N>;
     const float moment = 4 / (h * h); // the inverse moment of the weights
     const float k = -dt * moment, conductivity = matter.heat_conductivity();
@@ -72,16 +72,18 @@ FILIGREE_INLINE void scatter(std::span<const std::uint32_t> numbers, const Parti
                                 p.mass * p.c[1][2] + k * s[5], 0, 0, flow * p.warming[1], 0, 0);
         const E along_z = E::of(p.mass * p.c[2][0] + k * s[4], p.mass * p.c[2][1] + k * s[5],
                                 p.mass * p.c[2][2] + k * s[2], 0, 0, flow * p.warming[2], 0, 0);
-        Node* const first = tile + Grid::tile_index(at.base);
+        const std::ptrdiff_t first = Grid::tile_index(at.base);
+        const std::uint32_t hidden = behind.hidden.empty() ? 0 : behind.hidden[numbers[i]];
         for (int z = 0; z < 3; ++z)
             for (int y = 0; y < 3; ++y) {
                 const float wy = at.weight[2][z] * at.weight[1][y];
                 const float dy = at.first_way[1] + float(y) * h, dz = at.first_way[2] + float(z) * h;
                 const E row = value + along_y * dy + along_z * dz;
-                Node* const nodes = first + (z * kTileSide + y) * kTileSide;
+                const std::ptrdiff_t nodes = first + (z * kTileSide + y) * kTileSide;
                 for (int x = 0; x < 3; ++x) {
                     const float w = wy * at.weight[0][x], dx = at.first_way[0] + float(x) * h;
-                    auto* const node = reinterpret_cast<float*>(&nodes[x]);
+                    Node* const side = hidden >> (9 * z + 3 * y + x) & 1 ? behind.tile : tile;
+                    auto* const node = reinterpret_cast<float*>(&side[nodes + x]);
                     E sum = E::load(node);
                     sum += (row + along_x * dx) * w;
                     sum.store(node);
@@ -125,8 +127,8 @@ FILIGREE_INLINE void gather(std::span<const std::uint32_t> numbers, const Partic
 
 #ifdef FILIGREE_HAS_WIDTHS
 FILIGREE_AVX2 void scatter_wide(std::span<const std::uint32_t> numbers, const Particle* particles, const Matter& matter,
-                                float h, float dt, Node* tile) {
-    scatter<8>(numbers, particles, matter, h, dt, tile);
+                                float h, float dt, Node* tile, const BehindWalls& behind) {
+    scatter<8>(numbers, particles, matter, h, dt, tile, behind);
 }
 FILIGREE_AVX2 void gather_wide(std::span<const std::uint32_t> numbers, const Particle* particles, float h,
                                const Node* tile, AtParticle* out) {
@@ -137,11 +139,11 @@ FILIGREE_AVX2 void gather_wide(std::span<const std::uint32_t> numbers, const Par
 } // namespace
 
 void scatter_particles(std::span<const std::uint32_t> numbers, const Particle* particles, const Matter& matter,
-                       float spacing, float dt, Node* tile, VectorWidth width) {
+                       float spacing, float dt, Node* tile, VectorWidth width, const BehindWalls& behind) {
 #ifdef FILIGREE_HAS_WIDTHS
-    if (width != VectorWidth::bytes16) return scatter_wide(numbers, particles, matter, spacing, dt, tile);
+    if (width != VectorWidth::bytes16) return scatter_wide(numbers, particles, matter, spacing, dt, tile, behind);
 #endif
-    scatter<4>(numbers, particles, matter, spacing, dt, tile);
+    scatter<4>(numbers, particles, matter, spacing, dt, tile, behind);
 }
 
 void gather_at_particles(std::span<const std::uint32_t> numbers, const Particle* particles, float spacing,

@@ -140,17 +140,19 @@ float Matter::temperature(float enthalpy) const {
     return melting_from_ + l * (melting_to_ - melting_from_);
 }
 
+float Matter::longest_elastic_step(float grid_spacing) const {
+    return kElasticStep * grid_spacing / std::sqrt((bulk_ + 4.0f / 3 * shear_) / density_);
+}
+
 float Matter::longest_step(float grid_spacing) const {
-    const float wave = std::sqrt((bulk_ + 4.0f / 3 * shear_) / density_);
-    float step = kElasticStep * grid_spacing / wave;
+    float step = longest_elastic_step(grid_spacing);
     if (melts_) step = std::min(step, kViscousStep * density_ * grid_spacing * grid_spacing / viscosity_);
     if (diffusivity_ > 0) step = std::min(step, kConductionStep * grid_spacing * grid_spacing / diffusivity_);
     return step;
 }
 
 void Matter::limit_viscosity(float grid_spacing) {
-    const float wave = std::sqrt((bulk_ + 4.0f / 3 * shear_) / density_);
-    const float shortest = kElasticStep * grid_spacing / wave / kViscousShare;
+    const float shortest = longest_elastic_step(grid_spacing) / kViscousShare;
     viscosity_ = std::min(viscosity_, kViscousStep * density_ * grid_spacing * grid_spacing / shortest);
 }
 

@@ -64,6 +64,7 @@ public:
 
     /// s, the longest step that is stable on a grid of this spacing, m; without what moves.
     float longest_step(float grid_spacing) const;
+    float longest_elastic_step(float grid_spacing) const; ///< s: of its waves alone
     /// Viscosity is limited to what steps a quarter as long as elasticity's can carry, on this grid.
     void limit_viscosity(float grid_spacing);
 

@@ -2,7 +2,6 @@
 //   [Mueller 2004] Point based animation of elastic, plastic and melting objects: deformation gradients by moving least
 //   squares, forces as the exact derivative of the particles' energies, plastic flow by strain. Theirs also melts.
 //   [Smith 2018] Stable neo-Hookean flesh simulation: the energy, which recovers from collapse.
-//   [Chen 2024] Vertex block descent.
 //
 // Of each particle, with F its gradient from the body at rest and D = Fp^-1 the inverse of its plastic one, the elastic
 // gradient is Fe = F D, and
@@ -16,7 +15,6 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/body.h"
 #include "filigree/physics/body/elasticity.h"
-#include "filigree/physics/fem/vertex_block.h"
 #include "filigree/physics/meshfree/meshfree_frequency.h"
 #include "filigree/physics/meshfree/meshfree_plastic.h"
 #include "filigree/physics/step/byte_stream.h"
@@ -36,28 +34,12 @@ constexpr double kHourglass = 0.05; // of mu V / h^2
 // Of the power iteration for the squared frequency. It comes from below: hence the margin, which also covers what a
 // state changes beyond its largest stiffness. Tests compare with dense eigenvalues.
 constexpr int kIterations = 30;
-constexpr double kMargin = 1.4;
-// A neighbourhood in a point or on a line has no cofactor and so no force that opens it: sweeps take it for a thin box.
-constexpr float kLeastCofactor = 1e-3f; // |cof F|^2
-constexpr float kThinBox = 0.1f;        // added to F's diagonal
-// Growing out of a collapse by leaps leaves particles on the wrong side of each other.
-constexpr float kCollapsed = 0.5f;      // |F|^2
-constexpr float kCollapsedStep = 0.05f; // spacings a sweep
-// Corners folded inwards are held by nothing but their hourglass term, in states of equilibrium: sweeps harden it where
-// a neighbour has slipped far from where F says. No ordinary motion does that.
-constexpr float kFolded = 0.3f; // spacings
-constexpr float kMostHardening = 20;
+constexpr double kFrequencyMargin = 1.4;
 
 /// Moduli for a bulk modulus K and a shear modulus: L = lambda + 5/6 mu.
 Moduli moduli(float K, float shear, float z) {
     const float mu = shear * (4 / 3.f), L = K + shear * (1 / 6.f);
     return {mu, L, 1 + 0.75f * mu / L, z};
-}
-
-/// slip: weighted, as `allowed` is.
-FILIGREE_INLINE float hardening(Float4 slip, float allowed) {
-    const float squared = dot3(slip, slip);
-    return squared > allowed ? std::min(squared / allowed, kMostHardening) : 1.f;
 }
 
 /// The larger bound of each lane; NaN stays.
@@ -70,8 +52,8 @@ void take_extremes(BlockResult& all, const BlockResult& result) {
 class MeshfreeElasticity final : public Elasticity {
 public:
     MeshfreeElasticity(const Body& body, const RunContext& context)
-        : body_(body), slip_allowed_(float(double(kFolded * kFolded) * body.spacing() * body.spacing())),
-          plastic_(body), neighbours_(find_mls_neighbours(body.rest, body.volume, body.spacing(), context)),
+        : body_(body), plastic_(body),
+          neighbours_(find_mls_neighbours(body.rest, body.volume, body.spacing(), context)),
           position_(body.particle_count()), columns_(body.particle_count()) {
         const LameParameters lame = lame_parameters(body.material.young_modulus, body.material.poisson_ratio);
         const auto shear = float(lame.mu), bulk = float(lame.lambda + 2 * lame.mu / 3);
@@ -83,7 +65,7 @@ public:
             moduli_.push_back(moduli(bulk, shear, hourglass[i] * shear));
         }
         frequency_over_stiffness_ =
-            float(kMargin) *
+            float(kFrequencyMargin) *
             squared_frequency_over_stiffness(body, neighbours_, hourglass, {shear, bulk}, kIterations, context);
     }
 
@@ -99,20 +81,6 @@ public:
                 forces.set(i, to_vector(gather_force(neighbours_, position_.data(), columns_.data(), i)));
         });
         return report_of(found);
-    }
-
-    void sweep(Vectors& positions, const Descent& descent, const RunContext& context) override {
-        if (colors_.empty()) find_colors();
-        gather(positions, position_, context);
-        parallel_for(context, body_.particle_count(), kMeshfreeElasticityGrain,
-                     [&](std::size_t begin, std::size_t end) {
-                         for (std::size_t i = begin; i < end; ++i)
-                             columns_[i] = gather_gradient(neighbours_, position_.data(), i);
-                     });
-        for (const std::vector<Index>& color : colors_)
-            parallel_for(context, color.size(), kMeshfreeElasticityGrain / 16, [&](std::size_t begin, std::size_t end) {
-                for (std::size_t k = begin; k < end; ++k) move_particle(positions, descent, color[k]);
-            });
     }
 
     double energy(const Vectors& positions, const RunContext& context) const override {
@@ -205,98 +173,6 @@ private:
         return report;
     }
 
-    /// Greedily, so that no two particles of a color have a neighbour in common, nor are neighbours.
-    void find_colors() {
-        const std::size_t n = body_.particle_count();
-        std::vector<std::uint32_t> color(n, kNoIndex), seen;
-        const auto neighbours = [&](std::size_t i) {
-            return std::span(neighbours_.neighbours)
-                .subspan(neighbours_.offsets[i], neighbours_.offsets[i + 1] - neighbours_.offsets[i]);
-        };
-        for (std::size_t i = 0; i < n; ++i) {
-            const auto mark = [&](Index j) {
-                if (color[j] != kNoIndex) seen[color[j]] = std::uint32_t(i + 1);
-            };
-            for (const Index j : neighbours(i)) {
-                mark(j);
-                for (const Index k : neighbours(j)) mark(k);
-            }
-            std::uint32_t c = 0;
-            while (c < seen.size() && seen[c] == i + 1) ++c;
-            if (c == seen.size()) {
-                seen.push_back(0);
-                colors_.emplace_back();
-            }
-            color[i] = c;
-            colors_[c].push_back(Index(i));
-        }
-    }
-
-    /// Adds force and block of the energy of particle p, whose F changes by dx g^T.
-    FILIGREE_INLINE void add_energy_of(std::size_t p, Float4 g, Float4& force, Symmetric3& block) const {
-        Columns F = columns_[p];
-        if (const Mat3f* inverse = plastic_.inverse()) {
-            const Columns D = to_columns(inverse[p]);
-            F = {{times(F, D.c[0]), times(F, D.c[1]), times(F, D.c[2])}};
-            g = Float4{dot3(D.c[0], g), dot3(D.c[1], g), dot3(D.c[2], g), 0};
-        }
-        Columns cofactor = {{cross(F.c[1], F.c[2]), cross(F.c[2], F.c[0]), cross(F.c[0], F.c[1])}};
-        if (squared_norm(cofactor) < kLeastCofactor) {
-            for (int a = 0; a < 3; ++a) F.c[a][a] += kThinBox;
-            cofactor = {{cross(F.c[1], F.c[2]), cross(F.c[2], F.c[0]), cross(F.c[0], F.c[1])}};
-        }
-        const float I = squared_norm(F);
-        const Float4 cof = times(cofactor, g);
-        const float J = dot3(F.c[0], cofactor.c[0]), V = body_.volume[p];
-        const Moduli& m = moduli_[p];
-        const float inverse = 1 / (I + 1), shear = m.mu * (1 - inverse);
-        const Float4 Fg = times(F, g);
-        force -= V * (shear * Fg + m.L * (J - m.g0) * cof);
-        block.add_scaled_identity(V * shear * dot3(g, g));
-        block.add_outer(to_vector(cof), V * m.L);
-        block.add_outer(to_vector(Fg), V * 2 * m.mu * inverse * inverse);
-    }
-
-    void move_particle(Vectors& positions, const Descent& descent, Index i) {
-        if (descent.fixed[i]) return;
-        const Float4 x = position_[i];
-        const float inertia = descent.inertia[i];
-        Float4 force = inertia * (load3(descent.target, i) - x);
-        Symmetric3 block;
-        block.add_scaled_identity(inertia);
-        const Float4 self = to_lanes(neighbours_.self_gradient[i]);
-        add_energy_of(i, self, force, block);
-        float stiffness = 0;
-        const Columns& here = columns_[i];
-        for (std::size_t k = neighbours_.offsets[i]; k < neighbours_.offsets[i + 1]; ++k) {
-            const Index p = neighbours_.neighbours[k];
-            const Float4 pair = neighbours_.pairs[k];
-            add_energy_of(p, to_lanes(neighbours_.gradient(p, -to_vector(pair))), force, block);
-            const Float4 offset = pair[3] * (position_[p] - x);
-            const Float4 slip_here = offset - times(here, pair), slip_there = offset - times(columns_[p], pair);
-            const float allowed = pair[3] * pair[3] * slip_allowed_;
-            const float zi = moduli_[i].z * hardening(slip_here, allowed);
-            const float zp = moduli_[p].z * hardening(slip_there, allowed);
-            force += zi * slip_here + zp * slip_there;
-            stiffness += (zi + zp) * pair[3];
-        }
-        block.add_scaled_identity(stiffness);
-        Vec3f total = to_vector(force);
-        if (descent.touched[i] && descent.external) descent.external->add(i, positions, total, block);
-        Vec3f solved = block.solve(total);
-        const float most = kCollapsedStep * float(body_.spacing()), length = solved.norm();
-        if (length > most && squared_norm(here) < kCollapsed) solved *= most / length;
-        const Float4 step = to_lanes(solved);
-        positions.add(i, to_vector(step));
-        position_[i] += step;
-        for (int a = 0; a < 3; ++a) columns_[i].c[a] += step * self[a];
-        for (std::size_t k = neighbours_.offsets[i]; k < neighbours_.offsets[i + 1]; ++k) {
-            const Index p = neighbours_.neighbours[k];
-            const Vec3f g = neighbours_.gradient(p, -to_vector(neighbours_.pairs[k]));
-            for (int a = 0; a < 3; ++a) columns_[p].c[a] += step * g[a];
-        }
-    }
-
     double particle_energy(const Float4* position, std::size_t i) const {
         const Columns F = gather_gradient(neighbours_, position, i);
         Mat3d Fe = to_matrix(F).cast<double>();
@@ -314,13 +190,11 @@ private:
     }
 
     const Body& body_;
-    const float slip_allowed_; // m^2
     const StressLoop stress_ = widest_stress();
     PlasticParticles plastic_; // state
     const MlsNeighbours neighbours_;
     std::vector<Moduli> moduli_;
     float frequency_over_stiffness_ = 0; // bound on the squared frequency over the largest stiffness
-    std::vector<std::vector<Index>> colors_;
 
     // Scratch.
     std::vector<Float4> position_;

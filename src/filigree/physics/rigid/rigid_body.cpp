@@ -64,10 +64,6 @@ public:
         return report;
     }
 
-    void sweep(Vectors& positions, const Descent& descent, const RunContext&) override {
-        move_as_one(positions, body_.mass, descent);
-    }
-
     double energy(const Vectors&, const RunContext&) const override { return 0; }
     void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext&) const override {
         std::ranges::fill(gradients, rotation_of(positions).cast<float>());
@@ -92,38 +88,6 @@ private:
 const RigidElasticity& rigid(const BodyState& body) { return static_cast<const RigidElasticity&>(*body.elasticity); }
 
 } // namespace
-
-void move_as_one(Vectors& positions, std::span<const float> mass, const Descent& descent) {
-    using Vec6d = Eigen::Matrix<double, 6, 1>;
-    using Mat6d = Eigen::Matrix<double, 6, 6>;
-    const Vec3d centre = centre_of(positions, mass);
-    Vec6d force = Vec6d::Zero();
-    Mat6d stiffness = Mat6d::Zero();
-    for (std::size_t i = 0; i < positions.size(); ++i) {
-        const Vec3f place = positions[i];
-        Vec3f pull = descent.inertia[i] * (descent.target[i] - place);
-        Symmetric3 block;
-        block.add_scaled_identity(descent.inertia[i]);
-        if (descent.touched[i]) descent.external->add(Index(i), positions, pull, block);
-        const Vec3d arm = place.cast<double>() - centre;
-        Mat3d b, cross;
-        b << block.xx, block.xy, block.xz, block.xy, block.yy, block.yz, block.xz, block.yz, block.zz;
-        cross << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0; // turn x arm = cross turn
-        force.head<3>() += pull.cast<double>();
-        force.tail<3>() += arm.cross(pull.cast<double>());
-        stiffness.topLeftCorner<3, 3>() += b;
-        stiffness.topRightCorner<3, 3>() += b * cross;
-        stiffness.bottomLeftCorner<3, 3>() += cross.transpose() * b;
-        stiffness.bottomRightCorner<3, 3>() += cross.transpose() * b * cross;
-    }
-    const Vec6d step = stiffness.ldlt().solve(force);
-    if (!step.allFinite()) return;
-    const double angle = step.tail<3>().norm();
-    const Mat3d turn =
-        angle > 0 ? Eigen::AngleAxisd(angle, step.tail<3>() / angle).toRotationMatrix() : Mat3d(Mat3d::Identity());
-    for (std::size_t i = 0; i < positions.size(); ++i)
-        positions.set(i, (centre + step.head<3>() + turn * (positions[i].cast<double>() - centre)).cast<float>());
-}
 
 std::unique_ptr<Elasticity> make_rigid_elasticity(const Body& body) { return std::make_unique<RigidElasticity>(body); }
 
@@ -202,7 +166,6 @@ void drift_rigid(BodyState& body, double dt) {
     };
     half = turn_by(pose.turn, pose.turn, dt / 2);
     pose.turn = turn_by(pose.turn, half, dt).normalized();
-    place_particles(body);
 }
 
 std::vector<float> rigid_surface_stiffness(const BodyState& body) {
@@ -219,16 +182,16 @@ std::vector<float> rigid_surface_stiffness(const BodyState& body) {
     return stiffness;
 }
 
-void tire(BodyState& body, double frame_seconds) {
+bool grow_tired(BodyState& body, double frame_seconds) {
     RigidPose& pose = *body.rigid;
     float most = 0;
     for (std::size_t i = 0; i < body.velocities.size(); ++i) most = std::max(most, body.velocities[i].squaredNorm());
-    if (most > kSlow * kSlow) {
-        pose.quiet_seconds = 0;
-        return;
-    }
-    pose.quiet_seconds += frame_seconds;
-    if (pose.quiet_seconds < kTired) return;
+    pose.quiet_seconds = most > kSlow * kSlow ? 0 : pose.quiet_seconds + frame_seconds;
+    return pose.quiet_seconds >= kTired;
+}
+
+void fall_asleep(BodyState& body) {
+    RigidPose& pose = *body.rigid;
     pose.sleeps = true;
     pose.velocity = pose.angular = Vec3d::Zero();
     place_particles(body);

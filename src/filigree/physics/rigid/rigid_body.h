@@ -8,6 +8,7 @@ namespace filigree {
 /// Squared frequency that contacts give a rigid body at most, 1/s^2: stiff enough that five stacked stones sink in by
 /// less than a millimetre in all, soft enough for 16 substeps a frame at 60 frames a second.
 inline constexpr float kRigidSquaredFrequency = 0.99e6f;
+inline constexpr float kLongestRigidStep = 1.05e-3f; ///< s, of substeps that this allows
 
 /// The same particles and surface, of a material that does not deform. body: of fem or springs.
 Body as_rigid(const Body& body);
@@ -27,23 +28,20 @@ struct RigidLoad {
 RigidLoad rigid_load(const BodyState& body);
 /// m/s of the load and gravity, for dt; then what damping leaves, a factor.
 void kick_rigid(BodyState& body, const RigidLoad& load, const Vec3d& gravity, double dt, double kept);
-/// Moves by the velocities for dt, and places the particles.
+/// Moves the pose by the velocities for dt; place_particles comes after.
 void drift_rigid(BodyState& body, double dt);
 
 /// N/m of each surface point, so that those that touch at one time add no more than kRigidSquaredFrequency.
 std::vector<float> rigid_surface_stiffness(const BodyState& body);
 
-/// One Newton step of the six ways in which a body moves without deforming [Giles 2025]: all of a sweep for a rigid
-/// body; for others what sweeps from particle to particle are slow at.
-void move_as_one(Vectors& positions, std::span<const float> mass, const Descent& descent);
-
 /// Elastic forces of a body that has none.
 std::unique_ptr<Elasticity> make_rigid_elasticity(const Body& body);
 
 /// m/s of the fastest point, below which a body that rests tires.
-inline constexpr float kSlow = 5e-3f;
-/// Counts frames in which a body hardly moves; after half a second it sleeps.
-void tire(BodyState& body, double frame_seconds);
+inline constexpr float kSlow = 2e-3f;
+/// Counts frames in which a body hardly moves. Whether that is long enough to sleep: half a second.
+bool grow_tired(BodyState& body, double frame_seconds);
+void fall_asleep(BodyState& body);
 void wake(BodyState& body);
 
 } // namespace filigree

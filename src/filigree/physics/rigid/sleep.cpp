@@ -26,6 +26,8 @@ public:
     bool carries(std::size_t b) { return on_obstacle_[groups_.root(Index(b))] != 0; }
     /// Whether something touches it that never sleeps.
     bool is_beside_soft(std::size_t b) const { return beside_soft_[b] != 0; }
+    /// Of its island: the rigid bodies that touch it, those that touch these, and so on.
+    Index island(std::size_t b) { return groups_.root(Index(b)); }
 
 private:
     DisjointSets groups_;                                 ///< of rigid bodies that touch
@@ -37,18 +39,26 @@ private:
 void let_rest(SimulationState& state, double from, double until) {
     const bool disturbed = state.external.has_wind() || obstacle_way(state.world, state.bodies, from, until) > 0;
     Support support(state);
+    std::vector<std::uint8_t> is_awake(state.bodies.size(), 0); // at each island's root
     for (std::size_t b = 0; b < state.bodies.size(); ++b) {
         BodyState& body = state.bodies[b];
-        if (!body.rigid) continue;
+        if (!body.rigid || body.is_absent) continue;
         const bool is_moved =
             disturbed || body.is_held || state.external.pull(b, until) || state.external.push(body.actor);
         body.rigid->rests = !is_moved && support.carries(b);
-        if (body.rigid->rests && !support.is_beside_soft(b) && body.may_sleep) {
-            if (!body.rigid->sleeps) tire(body, state.frame_seconds());
-            continue;
+        const bool may_sleep = body.rigid->rests && !support.is_beside_soft(b) && body.may_sleep;
+        const bool is_tired = body.rigid->sleeps || grow_tired(body, state.frame_seconds());
+        if (!(may_sleep && is_tired)) is_awake[support.island(b)] = 1;
+    }
+    for (std::size_t b = 0; b < state.bodies.size(); ++b) {
+        BodyState& body = state.bodies[b];
+        if (!body.rigid || body.is_absent || body.rigid->sleeps != (is_awake[support.island(b)] != 0)) continue;
+        if (body.rigid->sleeps) {
+            state.contacts.look_near_again();
+            wake(body);
+        } else {
+            fall_asleep(body);
         }
-        if (body.rigid->sleeps) state.contacts.look_near_again();
-        wake(body);
     }
 }
 

@@ -15,7 +15,6 @@
 // Particles side by side along x share a stencil, and lanes are particles: the same sums in any vector width.
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/body/elasticity.h"
-#include "filigree/physics/fem/vertex_block.h"
 #include "filigree/physics/springs/spring_kernel.h"
 
 #include <algorithm>
@@ -33,11 +32,11 @@ namespace {
 // unit of J, just below 0; there this pushes out by 0.45 E. Random and collapsed starts came back with 1.5 and with 3,
 // and no longer with 12, where the tetrahedra of corners wedge each other fast.
 constexpr float kVolumeFrom = 0.3f, kVolumeStiffness = 1.5f;
-constexpr float kVolumeNear =
-    0.6f; // a sweep looks at cells below this at its start: one sweep will not take others there
-// Growing out of a collapse by leaps leaves particles on the wrong side of each other.
-constexpr float kCollapsedSpring = 0.5f;            // squared lengths over those at rest
-constexpr float kCollapsedSpringStep = 0.1f;        // spacings a sweep
+// That alone does not stop what hits hard. So a cell as a whole resists as well, by its mean gradient's volume ratio J:
+// below kCrushFrom by kCrushStiffness E V r^2, r = kCrushFrom - J, where it is inverted no more than where it is flat.
+// Steps are short enough for a cell that loses kCrushSoon more.
+constexpr float kCrushFrom = 0.4f, kCrushStiffness = 50, kCrushSoon = 0.1f;
+constexpr float kPressedFrom = 0.5f;                ///< volume ratio at a corner below which a cell is looked at
 constexpr float kLargestSpring = 1e15f;             // m: positions beyond are not fit for explicit steps
 constexpr std::size_t kSpringElasticityGrain = 256; // particles
 constexpr std::size_t kRunGrain = 2;
@@ -64,6 +63,30 @@ Vec3f volume_gradient(const CornerVolume& v, std::size_t axis, float inverse_cub
     return e[(axis + 1) % 3].cross(e[(axis + 2) % 3]) * (v.sign * inverse_cube);
 }
 
+/// A cell's mean edges, and how its volume depends on them.
+struct MeanVolume {
+    std::array<Vec3f, 3> edges, cofactors; ///< m; m^2
+    float ratio;                           ///< J
+    MeanVolume(const std::array<Vec3f, 8>& p, float inverse_cube) {
+        for (std::size_t a = 0; a < 3; ++a) {
+            const std::size_t bit = std::size_t{1} << a;
+            edges[a].setZero();
+            for (std::size_t c = 0; c < 8; ++c)
+                if (!(c & bit)) edges[a] += 0.25f * (p[c | bit] - p[c]);
+        }
+        for (std::size_t a = 0; a < 3; ++a) cofactors[a] = edges[(a + 1) % 3].cross(edges[(a + 2) % 3]);
+        ratio = inverse_cube * edges[0].dot(cofactors[0]);
+    }
+    /// dJ/dx of a corner.
+    Vec3f gradient(std::size_t corner, float inverse_cube) const {
+        Vec3f sum = Vec3f::Zero();
+        for (std::size_t a = 0; a < 3; ++a) sum += ((corner >> a & 1) ? 0.25f : -0.25f) * cofactors[a];
+        return inverse_cube * sum;
+    }
+};
+
+float cell_crush(float ratio) { return std::clamp(kCrushFrom - ratio, 0.0f, kCrushFrom); }
+
 /// How far the cells are pressed.
 struct CellVolumes {
     std::vector<float> least;            // volume ratio of a cell's corners, one a cell
@@ -78,6 +101,7 @@ public:
         const std::size_t n = body.particle_count();
         const double h = body.spacing();
         inverse_cube_ = float(1 / (h * h * h));
+        crush_stiffness_ = float(double(kCrushStiffness) * body.material.young_modulus * h * h * h);
         volume_stiffness_ = float(double(kVolumeStiffness) * body.material.young_modulus * h * h * h / 8);
         inverse_mass_.assign(n + Vectors::kPadding, 0);
         for (std::size_t i = 0; i < n; ++i) inverse_mass_[i] = 1 / body.mass[i];
@@ -87,13 +111,6 @@ public:
         for (std::size_t c = 0; c < body.cells.cells.size(); ++c)
             for (std::size_t corner = 0; corner < 8; ++corner)
                 cells_at_[body.cells.cell_corners[c][corner]][corner] = Index(c);
-        // Bending springs reach two steps far, so particles three apart are independent.
-        colors_.resize(27);
-        for (std::size_t i = 0; i < n; ++i) {
-            const Cells::LatticeIndex& at = body.cells.corners[i];
-            colors_[std::size_t(at[0] % 3 + 3 * (at[1] % 3) + 9 * (at[2] % 3))].push_back(Index(i));
-        }
-        std::erase_if(colors_, [](const std::vector<Index>& color) { return color.empty(); });
         bounds_.resize(runs_.runs.size());
         volumes_ = volumes_of_cells();
     }
@@ -109,14 +126,6 @@ public:
         if (volumes_.any_pressed) report.squared_frequency += add_volume_forces(positions, forces, context);
         if (!(report.most_stretch < kLargestSpring)) report.squared_frequency = std::numeric_limits<float>::infinity();
         return report;
-    }
-
-    void sweep(Vectors& positions, const Descent& descent, const RunContext& context) override {
-        find_pressed_cells(positions, volumes_, context);
-        for (const std::vector<Index>& color : colors_)
-            parallel_for(context, color.size(), kSpringElasticityGrain / 4, [&](std::size_t begin, std::size_t end) {
-                for (std::size_t k = begin; k < end; ++k) move_particle(positions, descent, color[k]);
-            });
     }
 
     double energy(const Vectors& positions, const RunContext& context) const override {
@@ -156,7 +165,7 @@ private:
             all.least = found.least >= all.least ? all.least : found.least;
             all.most_squared = found.most_squared <= all.most_squared ? all.most_squared : found.most_squared;
         }
-        volumes.any_pressed = all.least_corner < kVolumeFrom;
+        volumes.any_pressed = all.least_corner < kPressedFrom;
         ElasticReport report;
         report.least_volume_ratio = all.least;
         report.most_stretch = std::sqrt(all.most_squared / 3) / (4 * float(body_.spacing()));
@@ -181,6 +190,37 @@ private:
         }
     }
 
+    /// Calls visit(volume, corner, stiffness) for the crushed cells around particle i, which is that corner of theirs.
+    template <class Visit>
+    void for_crushed_cells(const Vectors& positions, const CellVolumes& volumes, Index i, const Visit& visit) const {
+        for (std::size_t here = 0; here < 8; ++here) {
+            const Index c = cells_at_[i][here];
+            if (c == kNoIndex || !(volumes.least[c] < kPressedFrom)) continue;
+            std::array<Vec3f, 8> p;
+            for (std::size_t k = 0; k < 8; ++k) p[k] = positions[body_.cells.cell_corners[c][k]];
+            const MeanVolume volume(p, inverse_cube_);
+            if (volume.ratio < kCrushFrom + kCrushSoon) visit(volume, here, crush_stiffness_ * body_.cells.fraction[c]);
+        }
+    }
+
+    /// Adds the forces of crushed cells on particle i; returns what they add to the bound, times its mass.
+    float add_crush_forces(const Vectors& positions, Vectors& forces, Index i) const {
+        float bound = 0;
+        for_crushed_cells(positions, volumes_, i, [&](const MeanVolume& volume, std::size_t corner, float stiffness) {
+            const Vec3f g = volume.gradient(corner, inverse_cube_);
+            const float crush = cell_crush(volume.ratio), push = crush * crush;
+            forces.add(i, (stiffness * push) * g);
+            // As of corners below. A corner is in three mean edges, by a quarter: of J's second derivative the blocks
+            // of one corner with all eight add up to 3 |e| / h^3.
+            float sum = 0, longest = 0;
+            for (std::size_t c = 0; c < 8; ++c) sum += volume.gradient(c, inverse_cube_).norm();
+            for (const Vec3f& edge : volume.edges) longest = std::max(longest, edge.norm());
+            bound += stiffness *
+                     (2 * cell_crush(volume.ratio - kCrushSoon) * g.norm() * sum + 3 * push * longest * inverse_cube_);
+        });
+        return bound;
+    }
+
     /// Returns what the pressed cells add to the bound on the squared frequency.
     float add_volume_forces(const Vectors& positions, Vectors& forces, const RunContext& context) const {
         const std::size_t n = body_.particle_count();
@@ -188,7 +228,7 @@ private:
         parallel_for(context, n, kSpringElasticityGrain, [&](std::size_t begin, std::size_t end) {
             float most = 0;
             for (std::size_t i = begin; i < end; ++i) {
-                float bound = 0;
+                float bound = add_crush_forces(positions, forces, Index(i));
                 for_pressed_corners(positions, volumes_, Index(i), kVolumeFrom,
                                     [&](const CornerVolume& volume, std::size_t axis, float stiffness) {
                                         const Vec3f g = volume_gradient(volume, axis, inverse_cube_);
@@ -213,44 +253,6 @@ private:
         return most;
     }
 
-    void move_particle(Vectors& positions, const Descent& descent, Index i) const {
-        if (descent.fixed[i]) return;
-        const Vec3f x = positions[i];
-        const float inertia = descent.inertia[i];
-        Vec3f force = inertia * (descent.target[i] - x);
-        Symmetric3 block;
-        block.add_scaled_identity(inertia);
-        const Star& star = stars_[i];
-        float lengths = 0, rests = 0; // squared
-        for (std::size_t s = 0; s < kStencil; ++s) {
-            if (star.other[s] == kNoIndex) continue;
-            Vec3f d = positions[star.other[s]] - x;
-            float squared = d.squaredNorm();
-            if (squared < steps_[s].least_squared) {
-                d = steps_[s].least;
-                squared = steps_[s].least_squared;
-            }
-            lengths += squared;
-            rests += steps_[s].rest * steps_[s].rest;
-            const float k = star.stiffness[s], across = 1 - steps_[s].rest / std::sqrt(squared);
-            force += k * across * d;
-            const float a = std::max(0.f, across);
-            block.add_scaled_identity(k * a);
-            block.add_outer(d, k * (1 - a) / squared);
-        }
-        for_pressed_corners(positions, volumes_, i, kVolumeNear,
-                            [&](const CornerVolume& volume, std::size_t axis, float stiffness) {
-                                const Vec3f g = volume_gradient(volume, axis, inverse_cube_);
-                                force -= stiffness * (volume.ratio - kVolumeFrom) * g;
-                                block.add_outer(g, stiffness);
-                            });
-        if (descent.touched[i] && descent.external) descent.external->add(i, positions, force, block);
-        Vec3f step = block.solve(force);
-        const float most = kCollapsedSpringStep * float(body_.spacing()), length = step.norm();
-        if (length > most && lengths < kCollapsedSpring * rests) step *= most / length;
-        positions.add(i, step);
-    }
-
     /// Half of its springs' energy, and that of the cells' corners that it is.
     double star_energy(const Vectors& positions, const CellVolumes& volumes, std::size_t i) const {
         double sum = 0;
@@ -266,6 +268,12 @@ private:
                                 const double below = double(volume.ratio - kVolumeFrom);
                                 if (axis == 3) sum += 0.5 * double(stiffness) * below * below;
                             });
+        for_crushed_cells(
+            positions, volumes, Index(i), [&](const MeanVolume& volume, std::size_t corner, float stiffness) {
+                if (corner != 0) return;
+                const double most = double(kCrushFrom), r = double(cell_crush(volume.ratio));
+                sum += double(stiffness) * (r * r * r / 3 + most * most * std::max(-double(volume.ratio), 0.0));
+            });
         return sum;
     }
 
@@ -275,8 +283,8 @@ private:
     std::array<Step, kStencil> steps_;
     std::vector<float> inverse_mass_;            // padded
     std::vector<std::array<Index, 8>> cells_at_; // cells around each particle, by which of their corners it is
-    std::vector<std::vector<Index>> colors_;
-    float inverse_cube_, volume_stiffness_; // 1 / h^3; kVolumeStiffness E h^3 / 8
+    float inverse_cube_, volume_stiffness_;      // 1 / h^3; kVolumeStiffness E h^3 / 8
+    float crush_stiffness_;                      // kCrushStiffness E h^3
     Kernels kernels_ = widest_kernels();
 
     // Scratch.

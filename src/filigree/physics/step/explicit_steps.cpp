@@ -1,6 +1,7 @@
 // Velocity Verlet: kick, drift, kick. The stable step follows from the squared frequencies that are found with the
 // forces.
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/contact/contact_law.h"
 #include "filigree/physics/rigid/rigid_body.h"
 #include "filigree/physics/rigid/rigid_state.h"
 #include "filigree/physics/step/simulation_state.h"
@@ -28,14 +29,17 @@ constexpr float kCalm = 0.05f;       ///< that change, as a speed, in parts of t
 constexpr float kNoisy = 0.15f;      ///< ... from which on damping is full
 constexpr float kNoisyDelay = 0.05f; ///< substeps
 /// A few crushed cells are little of a large body; forces change there as fast as steps follow.
-constexpr float kCrushedVolume = 0.1f; ///< of a cell, of its volume at rest
-constexpr float kCrushedDelay = 0.1f;  ///< substeps
+constexpr float kCrushedFrom = 0.3f;  ///< of a cell, of its volume at rest: damping begins, and grows ...
+constexpr float kCrushedDelay = 0.5f; ///< ... to this where a cell is flat, substeps
 /// Clay that is thrown at the ground would throw bits off, but for damping of waves of a few spacings [von Neumann
 /// 1950].
-constexpr float kFlowingDelay = 0.25f;     ///< of the time that a wave takes across a spacing
-constexpr float kLightDelay = 0.5f;        ///< substeps: of a piece's light corners, which would swing for ever ...
-constexpr float kFreeWay = 0.05f;          ///< spacings a substep: ... as far as they move faster
-constexpr unsigned kExplicitLimit = 20000; ///< substeps a frame, whatever was asked for
+constexpr float kFlowingDelay = 0.25f;    ///< of the time that a wave takes across a spacing
+constexpr float kLightDelay = 0.5f;       ///< substeps: of light corners, which would swing for ever ...
+constexpr float kFreeWay = 0.05f;         ///< spacings a substep: ... as far as they move faster
+constexpr double kMostDeforming = 0.5;    ///< spacings a substep, between particles of one body
+constexpr unsigned kMostSubsteps = 20000; ///< a frame
+constexpr double kUsualSubsteps = 256;    ///< a frame: what the first forces of a frame take for the step before
+constexpr float kFaster = 1.5f;           ///< than now, anything may go in the next substep
 
 /// Where internal damping has forces computed: f(x + tau v) = f(x) - tau K v, Kelvin-Voigt to first order; of v less
 /// its rigid part.
@@ -58,6 +62,14 @@ Vectors positions_ahead(const BodyState& body, float delay, const RunContext& co
         move_axis(ahead.z.data(), body.velocities.z, 2);
     });
     return ahead;
+}
+
+/// Whether light corners move more than a part of a spacing in a substep beside the heaviest corners of their cells.
+bool light_corners_swing(const BodyState& body, float dt) {
+    const float most = kFreeWay * float(body.body->spacing()) / dt;
+    return std::ranges::any_of(body.light_corners, [&](const BodyState::LightCorner& light) {
+        return (body.velocities[light.particle] - body.velocities[light.neighbour]).squaredNorm() > most * most;
+    });
 }
 
 /// The same for light corners alone: of what they move in a substep beside the heaviest corner of their cells, all that
@@ -118,6 +130,22 @@ double stable_step(double squared_frequency, double internal_damping) {
     return std::isfinite(squared_frequency) ? step : 0;
 }
 
+/// s, in which no two particles of the body move further than a part of the spacing beside each other: forces follow
+/// larger steps in no way, however stable they are near rest.
+double deforming_step(const BodyState& body) {
+    const auto spread = [](const std::vector<float>& v, std::size_t count) {
+        float least = v[0], most = v[0];
+        for (std::size_t i = 1; i < count; ++i) {
+            least = v[i] < least ? v[i] : least;
+            most = v[i] > most ? v[i] : most;
+        }
+        return double(most - least);
+    };
+    const Vectors& v = body.velocities;
+    const double speed = std::hypot(spread(v.x, v.size()), spread(v.y, v.size()), spread(v.z, v.size()));
+    return speed > 0 ? kMostDeforming * body.body->spacing() / speed : kNoLimit;
+}
+
 class ExplicitSteps {
 public:
     ExplicitSteps(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context)
@@ -128,7 +156,7 @@ public:
     double run() {
         if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
         find_contacts();
-        const float first_dt = float(state_.frame_seconds() / state_.options.most_substeps);
+        const float first_dt = float(state_.frame_seconds() / kUsualSubsteps);
         find_forces(first_dt);
         if (repair_start(state_, elastic_, report_, context_)) {
             state_.contacts.begin_anew();
@@ -141,7 +169,7 @@ public:
         const auto is_left = [&] { return until_ - now_ > 1e-9 * state_.frame_seconds(); };
         while (is_left()) {
             const double steps = steps_left();
-            if (!(steps <= steps_allowed()) || context_.is_cancelled()) break;
+            if (!is_finite_ || context_.is_cancelled()) break;
             const float dt = float((until_ - now_) / steps);
             const double before = now_;
             move(dt, steps <= 1 ? until_ : now_ + double(dt));
@@ -150,30 +178,23 @@ public:
             finish(dt);
             const Breaks breaks = break_bodies(state_, before, now_, context_);
             if (breaks.contacts) {
-                place_rigid();
                 if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
                 find_contacts();
             }
             if (breaks.forces || breaks.contacts) find_forces(dt, true);
         }
-        place_rigid();
         if (meets_anything_) state_.contacts.end_frame(bodies_, context_);
         return is_left() ? now_ : until_;
     }
 
 private:
+    /// As many as stability asks for, up to kMostSubsteps in the whole frame: what no step is short enough for takes
+    /// those.
     double steps_left() const {
         const double remaining = until_ - now_;
         const double fewest = std::ceil(kLeastSubsteps * remaining / state_.frame_seconds() - 1e-6);
-        return stable_step_ > 0 ? std::max(fewest, std::ceil(remaining / stable_step_)) : kExplicitLimit + 1.0;
-    }
-    /// A frame that was begun may take twice as many. Where bodies meet fast descent takes more substeps as well.
-    double steps_allowed() const {
-        double limit = kExplicitLimit;
-        if (state_.options.mode == StepMode::automatic)
-            limit = state_.options.most_substeps * state_.frame_seconds() /
-                    (state_.options.descent_substeps * state_.descent_step(state_.contacts.longest_step()));
-        return report_.substeps == 0 ? limit : 2 * limit - report_.substeps;
+        const double most = std::max(1.0, double(kMostSubsteps) - report_.substeps);
+        return std::min(most, std::max(fewest, std::ceil(remaining / stable_step_)));
     }
 
     /// Particles of rigid bodies as their poses have them after the last kick.
@@ -186,11 +207,47 @@ private:
     void move(float dt, double until) {
         const Stopwatch watch(report_.other_seconds);
         kick(0.5f * dt, false);
+        move_rigid(double(dt));
         drift(dt);
         const double before = std::exchange(now_, until);
         move_pins(state_, now_, dt);
         if (meets_anything_)
             state_.contacts.travel(bodies_, dt, float(obstacle_way(state_.world, bodies_, before, now_)), context_);
+    }
+
+    /// Rigid bodies take all of gravity at once and half of the kick by other forces, then impulses at what they touch,
+    /// and move with what comes of it. In free flight they move as gravity has them to the last digit.
+    void move_rigid(double dt) {
+        wake_met(dt);
+        const Vec3d& gravity = state_.world.gravity;
+        rigid_contacts_.prepare(bodies_);
+        each_awake_rigid([&](BodyState& body, std::size_t b) {
+            kick_rigid(body, {}, gravity, dt, 1);
+            kick_rigid(body, rigid_loads_[b], Vec3d::Zero(), 0.5 * dt, std::exp(-dt * body.body->material.damping));
+        });
+        rigid_contacts_.solve(bodies_, dt);
+        each_awake_rigid([&](BodyState& body, std::size_t b) {
+            drift_rigid(body, dt);
+            if (!rigid_contacts_.pushes(b)) body.rigid->centre -= 0.5 * dt * dt * gravity;
+        });
+        rigid_contacts_.finish(bodies_, dt, double(contact_law::smooth_speed(state_.world, float(dt))));
+        place_rigid();
+    }
+
+    /// Sleepers wake that something is about to touch.
+    void wake_met(double dt) {
+        bool woke = false;
+        for (const ContactPoint& point : rigid_contacts_.points()) {
+            if (point.other == kNoIndex || bodies_[point.body].sleeps() == bodies_[point.other].sleeps()) continue;
+            const bool first = bodies_[point.body].sleeps();
+            const Index sleeper = first ? point.body : point.other, comes = first ? point.other : point.body;
+            const float speed = state_.contacts.speed(comes);
+            if (double(point.separation) > dt * double(speed)) continue;
+            wake(bodies_[sleeper]);
+            rigid_loads_[sleeper] = {};
+            woke = true;
+        }
+        if (woke) state_.contacts.woke(bodies_);
     }
 
     void find_contacts() {
@@ -200,10 +257,17 @@ private:
         const float speed = state_.contacts.approach_speed(bodies_) + float(state_.world.gravity.norm() * frame);
         const float way = speed * float(frame) + float(obstacle_way(state_.world, bodies_, now_, now_ + frame));
         const float spacing = least_spacing(bodies_);
-        state_.contacts.search(
-            bodies_,
-            {.time = now_, .obstacle_reach = std::clamp(2 * way, 0.25f * spacing, 4 * spacing), .frame = frame},
-            context_);
+        float step_way = 0;
+        if (state_.contacts.follows_points()) { // half-spaces stop also what is found below them
+            const double step = std::min(frame / kLeastSubsteps, stable_step_ > 0 ? stable_step_ : frame);
+            step_way = kFaster * (speed * float(step) + float(obstacle_way(state_.world, bodies_, now_, now_ + step)));
+        }
+        state_.contacts.search(bodies_,
+                               {.time = now_,
+                                .obstacle_reach = std::clamp(2 * way, 0.25f * spacing, 4 * spacing),
+                                .frame = frame,
+                                .step_way = step_way},
+                               context_);
     }
 
     /// All forces at the present positions, and the step that is stable there.
@@ -211,7 +275,7 @@ private:
         find_elastic_forces(dt, is_again);
         {
             const Stopwatch watch(report_.contact_seconds);
-            const ContactReport touching = state_.contacts.add_forces(bodies_, now_, dt, context_);
+            const ContactReport touching = state_.contacts.add_forces(bodies_, now_, dt, rigid_contacts_, context_);
             report_.contacts = touching.contacts;
             report_.deepest_contact = std::max(report_.deepest_contact, double(touching.deepest));
             report_.deepest_in_matter = std::max(report_.deepest_in_matter, double(touching.deepest_in_matter));
@@ -240,13 +304,15 @@ private:
         each_awake([&](const BodyState& body, std::size_t b) {
             if (body.rigid) rigid_loads_[b] = rigid_load(body);
         });
-        for (std::size_t b = 0; b < bodies_.size(); ++b)
-            if (!bodies_[b].sleeps())
-                stable_in_frame_ =
-                    std::min(stable_in_frame_, stable_step(frequencies[b], double(vibrations_[b].delay)));
+        is_finite_ = true;
+        for (std::size_t b = 0; b < bodies_.size(); ++b) {
+            if (bodies_[b].sleeps()) continue;
+            is_finite_ &= std::isfinite(frequencies[b]);
+            stable_in_frame_ = std::min(stable_in_frame_, stable_step(frequencies[b], double(vibrations_[b].delay)));
+            if (!bodies_[b].rigid) stable_step_ = std::min(stable_step_, deforming_step(bodies_[b]));
+        }
         stable_step_ = std::min(stable_step_, stable_in_frame_);
-        const double shortest = std::max(kShortestOpening * stable_step_, (until_ - now_) / steps_allowed());
-        stable_step_ = std::min(stable_step_, std::max(opening_step, shortest));
+        stable_step_ = std::min(stable_step_, std::max(opening_step, kShortestOpening * stable_step_));
     }
 
     /// s of internal damping, unless more is needed.
@@ -262,7 +328,8 @@ private:
         Vibration& vibration = vibrations_[b];
         const float usual = usual_delay(*body.body);
         if (!std::exchange(vibration.has_forces, true)) return usual;
-        const float crushed = elastic_[b].least_volume_ratio < kCrushedVolume ? kCrushedDelay * dt : 0;
+        const float crushed =
+            kCrushedDelay * dt * std::clamp(1 - elastic_[b].least_volume_ratio / kCrushedFrom, 0.0f, 1.0f);
         if (vibration.before.size() == 0) {
             vibration.before = body.forces;
             return std::max(usual, crushed);
@@ -290,9 +357,10 @@ private:
         BodyState& body = bodies_[b];
         float& delay = vibrations_[b].delay;
         if (!body.rigid && !(is_again && vibrations_[b].has_forces)) delay = find_delay(b, dt);
-        if (delay > 0 || !body.light_corners.empty()) {
+        const bool swings = light_corners_swing(body, dt);
+        if (delay > 0 || swings) {
             Vectors ahead = delay > 0 ? positions_ahead(body, delay, context_) : body.positions;
-            damp_light_corners(body, dt, ahead);
+            if (swings) damp_light_corners(body, dt, ahead);
             elastic_[b] = body.elasticity->forces(ahead, body.forces, context_);
         } else {
             elastic_[b] = body.elasticity->forces(body.positions, body.forces, context_);
@@ -306,7 +374,11 @@ private:
             push_out(state_, now_, context_);
         }
         const Stopwatch watch(report_.other_seconds);
-        kick(0.5f * dt, true); // rigid bodies' particles follow with the next drift, or place_rigid
+        kick(0.5f * dt, true);
+        each_awake_rigid([&](BodyState& body, std::size_t b) {
+            kick_rigid(body, rigid_loads_[b], Vec3d::Zero(), 0.5 * double(dt), 1);
+            place_particles(body);
+        });
         move_pins(state_, now_, dt);
         finish_substep(state_, dt, context_);
         ++report_.substeps;
@@ -320,12 +392,18 @@ private:
         });
     }
 
-    /// Pinned particles too: move_pins sets them right.
+    template <class Visit>
+    void each_awake_rigid(const Visit& visit) {
+        for (std::size_t b = 0; b < bodies_.size(); ++b)
+            if (bodies_[b].rigid && !bodies_[b].sleeps()) visit(bodies_[b], b);
+    }
+
+    /// Pinned particles too: move_pins sets them right. Rigid bodies have their own.
     void kick(float dt, bool damp) {
         const Vec3f gravity = state_.world.gravity.cast<float>();
-        each_awake([&](BodyState& body, std::size_t b) {
+        each_awake([&](BodyState& body, std::size_t) {
             const double kept = damp ? std::exp(-2 * double(dt) * body.body->material.damping) : 1;
-            if (body.rigid) return kick_rigid(body, rigid_loads_[b], state_.world.gravity, double(dt), kept);
+            if (body.rigid) return;
             parallel_for(context_, body.positions.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
                 const float* inverse_mass = body.inverse_mass.data();
                 const auto kick_axis = [&](std::vector<float>& velocities, const std::vector<float>& forces, float g) {
@@ -343,7 +421,7 @@ private:
 
     void drift(float dt) {
         each_awake([&](BodyState& body, std::size_t) {
-            if (body.rigid) return drift_rigid(body, double(dt));
+            if (body.rigid) return;
             parallel_for(context_, body.positions.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
                 for (std::size_t i = begin; i < end; ++i) body.positions.x[i] += dt * body.velocities.x[i];
                 for (std::size_t i = begin; i < end; ++i) body.positions.y[i] += dt * body.velocities.y[i];
@@ -366,7 +444,9 @@ private:
     };
     std::vector<Vibration> vibrations_;
     std::vector<RigidLoad> rigid_loads_; ///< of each body, by find_forces
+    RigidContacts rigid_contacts_;       ///< the same
     double stable_step_ = 0;             // s
+    bool is_finite_ = true;              ///< the forces found last
     /// s: the shortest step that any body's vibrations have asked for in this frame. Steps that become longer again as
     /// these swing give them energy.
     double stable_in_frame_ = kNoLimit;

@@ -29,13 +29,25 @@ Vec3f push_of_wind(const BodyState& body, std::size_t point, const Mat3f& gradie
     if (!(size > 0)) return Vec3f::Zero();
     const float inwards = -(wind - embedded_point(body.surface, point, body.velocities)).dot(area) / size;
     if (!(inwards > 0)) return Vec3f::Zero();
-    // No further than the wind's own speed within the frame, whatever the point weighs.
     float mass = 0;
     for (Index k = body.surface.offsets[point]; k < body.surface.offsets[point + 1]; ++k)
         mass += std::abs(body.surface.weights[k]) * body.body->mass[body.surface.particles[k]];
-    const float most = mass * inwards * float(frames_per_second) / 8; // a particle has several points
-    const float push = std::min(0.5f * float(air_density) * inwards * inwards * size, most);
-    return -push / size * area;
+    return -wind_push(air_density, inwards, size, mass, frames_per_second) / size * area;
+}
+
+/// From rest to now, around the particles of a region.
+Mat3f region_gradient(const Embedding& region, const BodyState& body, const RunContext& context) {
+    Mat3f gradient = Mat3f::Zero();
+    if (!body.elasticity) {
+        Vec3f place;
+        fit_embedded(region, body.body->rest, body.positions, std::span(&place, 1), std::span(&gradient, 1), context);
+        return bounded_stretch(gradient);
+    }
+    std::vector<Mat3f> gradients(body.positions.size());
+    body.elasticity->gradients(body.positions, gradients, context);
+    for (std::size_t k = 0; k < region.particles.size(); ++k)
+        gradient += region.weights[k] * gradients[region.particles[k]];
+    return gradient;
 }
 
 } // namespace
@@ -65,12 +77,7 @@ Grip make_grip(const Hand& hand, const BodyState& body, const RunContext& contex
     }
     for (float& weight : grip.region.weights) weight /= float(mass);
     grip.region.offsets = {0, Index(grip.region.particles.size())};
-    std::vector<Mat3f> gradients(rest.size());
-    body.elasticity->gradients(body.positions, gradients, context);
-    Mat3f gradient = Mat3f::Zero();
-    for (std::size_t k = 0; k < grip.region.particles.size(); ++k)
-        gradient += grip.region.weights[k] * gradients[grip.region.particles[k]];
-    grip.offset = gradient * (point - embedded_point(grip.region, 0, rest));
+    grip.offset = region_gradient(grip.region, body, context) * (point - embedded_point(grip.region, 0, rest));
     // A pull of k gives particle i the squared frequency k w_i / m_i, at most k / (sum of weighted masses).
     const double stiffest = double(kHandShare) * double(body.rest_squared_frequency) * mass;
     grip.stiffness = float(hand.stiffness > 0 ? std::min(hand.stiffness, stiffest) : stiffest / 8);
@@ -122,7 +129,7 @@ void ExternalForces::each_push(std::span<State> bodies, double time, const Visit
 
 void ExternalForces::add_forces(std::span<BodyState> bodies, double time, const RunContext& context) const {
     each_push(bodies, time, [](BodyState& body, std::size_t, Index particle, const Vec3f& acceleration) {
-        body.forces.add(particle, body.body->mass[particle] * acceleration);
+        if (!body.is_on_grid) body.forces.add(particle, body.body->mass[particle] * acceleration);
     });
     if (!has_wind()) return;
     for (std::size_t b = 0; b < bodies.size(); ++b) {
@@ -131,6 +138,19 @@ void ExternalForces::add_forces(std::span<BodyState> bodies, double time, const 
             for (std::size_t i = begin; i < end; ++i) bodies[b].forces.add(i, wind_[b][i]);
         });
     }
+}
+
+void ExternalForces::add_forces_on_grid(std::span<BodyState> bodies, double time) const {
+    each_push(bodies, time, [](BodyState& body, std::size_t, Index particle, const Vec3f& acceleration) {
+        if (body.is_on_grid) body.forces.add(particle, body.body->mass[particle] * acceleration);
+    });
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+        if (bodies[b].is_on_grid) add_pulls(bodies[b], b, time, 0);
+}
+
+bool ExternalForces::acts_on(std::size_t body, double time) const {
+    return push(body) || pull(body, time) ||
+           std::ranges::any_of(world_.forces, [&](const RegionForce& force) { return force.body == body; });
 }
 
 double ExternalForces::add_pulls(BodyState& body, std::size_t index, double time, double squared_frequency) const {
@@ -142,15 +162,6 @@ double ExternalForces::add_pulls(BodyState& body, std::size_t index, double time
         squared_frequency += double(grip.squared_frequency);
     }
     return squared_frequency;
-}
-
-std::vector<Vectors> ExternalForces::push_accelerations(std::span<const BodyState> bodies, double time) const {
-    std::vector<Vectors> accelerations(bodies.size());
-    for (std::size_t b = 0; b < bodies.size(); ++b) accelerations[b] = Vectors(bodies[b].positions.size());
-    each_push(bodies, time, [&](const BodyState&, std::size_t body, Index particle, const Vec3f& acceleration) {
-        accelerations[body].add(particle, acceleration);
-    });
-    return accelerations;
 }
 
 } // namespace filigree

@@ -5,6 +5,8 @@
 #include "filigree/physics/body/body_state.h"
 #include "filigree/physics/world.h"
 
+#include <algorithm>
+
 namespace filigree {
 
 /// A hand and the particles it holds: those near its point, by mass, so that nothing is plucked out of the surface.
@@ -25,6 +27,12 @@ struct Grip {
 /// The particles around hand.point at rest are seized, wherever they are now.
 Grip make_grip(const Hand& hand, const BodyState& body, const RunContext& context);
 
+/// N, of wind that comes towards a surface of this area at `inwards` m/s. What weighs `mass` takes up no more than an
+/// eighth of that speed in a part of a second: it may have several such surfaces.
+inline float wind_push(double air_density, float inwards, float area, float mass, double parts_a_second) {
+    return std::min(0.5f * float(air_density) * inwards * inwards * area, mass * inwards * float(parts_a_second) / 8);
+}
+
 class ExternalForces {
 public:
     /// world: outlives this. bodies: fixed in number from here on.
@@ -41,16 +49,15 @@ public:
     /// Wind on the surfaces as they are now. Once a frame: what it moves in a frame is bounded.
     void find_wind(std::span<const BodyState> bodies, double time, double frames_per_second, const RunContext& context);
 
-    /// Adds forces on regions and particles and of the wind to the bodies' forces.
+    /// Adds forces on regions and particles and of the wind to the bodies' forces; not of those on the grid.
     void add_forces(std::span<BodyState> bodies, double time, const RunContext& context) const;
+    /// Adds forces on regions and particles, and the pull of hands, to the forces of bodies on the grid. The wind meets
+    /// these where the grid has their surface.
+    void add_forces_on_grid(std::span<BodyState> bodies, double time) const;
+    /// Whether a hand, or a force on a region or on particles, acts on a body now.
+    bool acts_on(std::size_t body, double time) const;
     /// Adds the pull of hands to a body's forces. Returns the bound on its squared frequency with that of hands added.
     double add_pulls(BodyState& body, std::size_t index, double time, double squared_frequency) const;
-    /// The same forces as accelerations, m/s^2, without hands: of regions and particles all in one, and of the wind on
-    /// a particle.
-    std::vector<Vectors> push_accelerations(std::span<const BodyState> bodies, double time) const;
-    Vec3f wind_acceleration(const BodyState& body, std::size_t index, std::size_t particle) const {
-        return body.inverse_mass[particle] * wind_[index][particle];
-    }
     bool has_wind() const { return world_.air_density > 0; }
 
 private:

@@ -4,6 +4,9 @@
 #include "filigree/physics/rigid/rigid_body.h"
 #include "filigree/physics/rigid/rigid_state.h"
 
+#include <algorithm>
+#include <tuple>
+
 namespace filigree {
 
 namespace {
@@ -79,9 +82,19 @@ std::size_t hold_lost_particles(SimulationState& state, BodyState& body) {
                 body.positions.set(i, motion.place(rest[i].cast<double>()).cast<float>());
             body.velocities.set(i, motion.velocity_at(body.positions[i].cast<double>()).cast<float>());
         }
+        note_lost(state, body, std::size_t(std::ranges::find(is_lost, 1) - is_lost.begin()));
         if (body.rigid) fit_pose(body);
     }
     return body.is_on_grid ? state.grid->repair(body.actor, body.positions, body.velocities, is_lost) : lost;
+}
+
+void note_lost(SimulationState& state, const BodyState& body, std::size_t particle) {
+    if (!state.first_lost) state.first_lost = {body.actor, body.positions[particle]};
+}
+
+void tell_first_lost(SimulationState& state, FrameReport& report) {
+    if (state.first_lost) std::tie(report.clamped_body, report.clamped_at) = *state.first_lost;
+    state.first_lost.reset();
 }
 
 std::size_t hold_lost_particles(SimulationState& state) {

@@ -12,4 +12,9 @@ std::size_t hold_lost_particles(SimulationState& state);
 /// The same of one body.
 std::size_t hold_lost_particles(SimulationState& state, BodyState& body);
 
+/// Remembers the first particle of a frame that was repaired or held, for the report.
+void note_lost(SimulationState& state, const BodyState& body, std::size_t particle);
+/// Puts it into the report, and forgets it.
+void tell_first_lost(SimulationState& state, FrameReport& report);
+
 } // namespace filigree

@@ -145,9 +145,8 @@ std::uint64_t hash_of(std::span<const Actor> actors) {
 std::uint64_t hash_of(const StepOptions& o) {
     ByteWriter out;
     out.value(o.frames_per_second);
-    for (const unsigned number :
-         {unsigned(o.mode), o.most_substeps, o.descent_substeps, o.descent_iterations,
-          unsigned(o.contacts_between_bodies), unsigned(o.contacts_within_bodies), unsigned(o.automatic_rigid)})
+    for (const unsigned number : {unsigned(o.mode), o.most_substeps, unsigned(o.contacts_between_bodies),
+                                  unsigned(o.contacts_within_bodies), unsigned(o.automatic_rigid)})
         out.value(number);
     return hash_of(std::move(out));
 }

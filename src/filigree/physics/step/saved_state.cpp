@@ -9,11 +9,13 @@ namespace filigree {
 
 namespace {
 
-// The name of the format, its version last. A: meshfree bodies touch as others do.
-constexpr std::uint64_t kMagic = 0x41455441'54534c46; // "FLSTATEA"
-static_assert(sizeof(Contacts::NearMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
+// The name of the format, its version last. B: meshfree bodies touch as others do.
+constexpr std::uint64_t kMagic = 0x42455441'54534c46; // "FLSTATEB"
+static_assert(sizeof(Contacts::NearMemory) == 6 * sizeof(Index) + 2 * sizeof(Vec3f) + sizeof(Vec3d),
+              "padding would be saved");
+static_assert(sizeof(FeatureContacts::Near) == 6 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(MatterContacts::SideMemory) == 6 * sizeof(Index), "padding would be saved");
-static_assert(sizeof(MatterContacts::PairMemory) == 4 * sizeof(Index) + 3 * sizeof(Vec3f), "padding would be saved");
+static_assert(sizeof(MatterContacts::PairMemory) == 4 * sizeof(Index) + 4 * sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(LinkState) == 2 * sizeof(float) + sizeof(Vec3f), "padding would be saved");
 
 void write_pose(ByteWriter& writer, const std::optional<RigidPose>& pose) {
@@ -62,6 +64,8 @@ void write_contacts(ByteWriter& writer, const Contacts::Memory& contacts) {
     writer.array(std::span(contacts.near));
     writer.value(contacts.near_way);
     writer.value(contacts.near_until);
+    writer.array(std::span(contacts.seen));
+    writer.array(std::span(contacts.features));
     writer.value(contacts.matter.way);
     writer.value(contacts.matter.until);
     writer.array(std::span(contacts.matter.sides));
@@ -74,6 +78,8 @@ Contacts::Memory read_contacts(ByteReader& reader) {
     contacts.near = reader.array<Contacts::NearMemory>();
     contacts.near_way = reader.value<float>();
     contacts.near_until = reader.value<float>();
+    contacts.seen = reader.array<std::uint8_t>();
+    contacts.features = reader.array<FeatureContacts::Near>();
     contacts.matter.way = reader.value<float>();
     contacts.matter.until = reader.value<float>();
     contacts.matter.sides = reader.array<MatterContacts::SideMemory>();

@@ -27,9 +27,11 @@ struct SimulationState {
     const StepOptions options;
     const std::size_t actor_count;
     const MadeFor made_for;
-    std::vector<BodyState> bodies;      ///< of the actors, then pieces
-    std::vector<std::string> why_rigid; ///< of each actor: Simulation::why_rigid
-    std::vector<Cracks> cracks;         ///< of bodies that break
+    std::vector<BodyState> bodies;                           ///< of the actors, then pieces
+    std::vector<std::string> why_rigid;                      ///< of each actor: Simulation::why_rigid
+    std::optional<std::pair<std::size_t, Vec3f>> first_lost; ///< of this frame: actor and place (lost_particles.h)
+    std::vector<StartOverlap> start_overlaps;
+    std::vector<Cracks> cracks; ///< of bodies that break
     Contacts contacts;
     ExternalForces external;
     std::unique_ptr<mpm::Bodies> grid; ///< of bodies of mpm; never null
@@ -42,25 +44,25 @@ struct SimulationState {
     double frame_seconds() const { return 1 / options.frames_per_second; }
     double time() const { return double(frame) * frame_seconds(); }
     const Cracks* cracks_of(std::size_t body) const; ///< null: it does not break
-    /// s: a substep of descent, where bodies that meet could pass through each other in ones longer than `longest`.
-    double descent_step(double longest) const;
 };
 
-/// Steps by velocity Verlet as far as that goes. Returns the time reached: before `until` when steps became too many
-/// (for descent to go on) or the work was cancelled.
+/// Steps by velocity Verlet. Returns the time reached: before `until` where something is not finite any more, or the
+/// work was cancelled.
 double step_explicitly(SimulationState& state, double from, double until, FrameReport& report,
                        const RunContext& context);
-/// Steps by vertex block descent. Breaks off when cancelled.
-void step_by_descent(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context);
 
-// What both do in a substep.
+/// Steps bodies of mpm. Breaks off when cancelled.
+void step_on_grid(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context);
+
+// Parts of a substep.
 
 /// What a body's elasticity met, into the frame's report.
 void note_deformation(FrameReport& report, std::size_t body, const ElasticReport& met);
 
 float least_spacing(std::span<const BodyState> bodies);
 /// Puts pinned particles where their motion has them at `now`, with its velocity; dt: of the substep, 0 at the start.
-void move_pins(SimulationState& state, double now, float dt);
+/// Of bodies on the grid, or of the others.
+void move_pins(SimulationState& state, double now, float dt, bool on_grid = false);
 /// Starts that no step can take: coincident particles are shaken apart, and what is stretched too far is scaled down.
 /// Whether anything was done.
 bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic, FrameReport& report,

@@ -1,6 +1,7 @@
-// The parts of a substep that explicit steps and descent share.
+// Parts of a substep.
 #include "filigree/core/random.h"
 #include "filigree/physics/rigid/rigid_body.h"
+#include "filigree/physics/step/lost_particles.h"
 #include "filigree/physics/step/simulation_state.h"
 
 #include <algorithm>
@@ -11,10 +12,10 @@ namespace filigree {
 
 namespace {
 
-constexpr float kMostStretch = 10; ///< a body that is stretched more than this ...
-constexpr float kStretchAfter = 3; ///< ... is scaled down to this
-constexpr double kReveals = 8;     ///< a frame: how often points of new cracks begin to touch others
-constexpr double kMostParts = 16;  ///< of a usual substep of descent, where bodies meet fast
+/// Largest |F| / sqrt(3) of a cell at a frame's start: a body with more is scaled down to kStretchAfter. Uniaxial
+/// stretch reaches it at 10 times the length.
+constexpr float kMostStretch = 6, kStretchAfter = 2;
+constexpr double kReveals = 8; ///< a frame: how often points of new cracks begin to touch others
 
 void shake(BodyState& body, std::uint64_t seed) {
     const auto shift = [&](std::size_t number) {
@@ -61,20 +62,16 @@ const Cracks* SimulationState::cracks_of(std::size_t body) const {
     return found == cracks.end() ? nullptr : &*found;
 }
 
-double SimulationState::descent_step(double longest) const {
-    const double usual = frame_seconds() / options.descent_substeps;
-    return std::clamp(longest, usual / kMostParts, usual);
-}
-
 float least_spacing(std::span<const BodyState> bodies) {
     float spacing = std::numeric_limits<float>::max();
     for (const BodyState& body : bodies) spacing = std::min(spacing, float(body.body->spacing()));
     return spacing;
 }
 
-void move_pins(SimulationState& state, double now, float dt) {
+void move_pins(SimulationState& state, double now, float dt, bool on_grid) {
     for (std::size_t p = 0; p < state.world.pins.size(); ++p) {
         const Pin& pin = state.world.pins[p];
+        if (state.bodies[pin.body].is_on_grid != on_grid) continue;
         const Eigen::Isometry3d motion = pin.motion.at(now);
         const MotionRate rate = rate_of(pin.motion, now);
         for (std::size_t k = 0; k < pin.particles.size(); ++k) {
@@ -96,11 +93,15 @@ bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic
         if (std::abs(elastic[b].least_volume_ratio) < 1e-12f) {
             repaired = true;
             shake(state.bodies[b], context.seed + b);
+            state.contacts.was_placed(b);
         }
         if (elastic[b].most_stretch <= kMostStretch) continue;
         repaired = true;
         const float factor = std::isfinite(elastic[b].most_stretch) ? kStretchAfter / elastic[b].most_stretch : 0.0f;
-        report.clamped_particles += scale_down(state.bodies[b], factor);
+        const std::size_t moved = scale_down(state.bodies[b], factor);
+        if (moved > 0) note_lost(state, state.bodies[b], 0);
+        report.clamped_particles += moved;
+        state.contacts.was_placed(b);
     }
     return repaired;
 }
