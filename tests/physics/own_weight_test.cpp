@@ -80,8 +80,8 @@ TEST(BodySize, IsTheLongestSideAndNotBesideAScale) {
         BodyOptions options;
         options.scale = scale;
         options.size = size;
-        const Result<Body> body = make_body(mesh, {}, options, kOneThread);
-        return body ? std::string() : body.error().message;
+        const Result<Body> made = make_body(mesh, {}, options, kOneThread);
+        return made ? std::string() : made.error().message;
     };
     const Mesh bar = make_bar({.resolution = 2});
     EXPECT_NE(refused(2, 1, bar).find("scale or size, not both"), std::string::npos);

@@ -188,11 +188,12 @@ void RigidContacts::finish(std::span<BodyState> bodies, double dt, double slow) 
     sweep_until_still(kStill * (10 * dt));
     for (std::size_t k = 0; k < rows_.size(); ++k) {
         const Row& row = rows_[k];
-        const bool bounces = row.approach < -slow; // the blow's force is not that of the next substep
+        // Of what comes apart the next substep begins anew: the blow's force would throw it.
+        const bool parts = relative_velocity(row).dot(row.normal) > 0.5 * slow;
         *points_[k].holds = row.impulse > 0;
         const Vec3d impulse = row.impulse * row.normal + row.tangent_impulses[0] * row.tangents[0] +
                               row.tangent_impulses[1] * row.tangents[1];
-        *points_[k].force = bounces ? Vec3f(Vec3f::Zero()) : Vec3f((impulse / dt).cast<float>());
+        *points_[k].force = parts ? Vec3f(Vec3f::Zero()) : Vec3f((impulse / dt).cast<float>());
     }
     write_back(bodies);
 }
