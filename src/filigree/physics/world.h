@@ -48,7 +48,7 @@ struct Ball {
 struct Cuboid {
     Vec3d centre = Vec3d::Zero(), size = Vec3d::Ones(); ///< along the axes before the obstacle's motion
 };
-class ObstacleSurface; // contact/obstacle_surface.h
+class ObstacleSurface;
 /// Its triangles are walls with two sides, whether they close or not: nothing goes through them, from wherever it
 /// comes. What starts inside of a closed one stays in it, as in a room.
 struct MeshObstacle {

@@ -9,12 +9,12 @@ using namespace contact_law;
 
 namespace {
 
-constexpr double kMostParts = 4096;    // of an edge
-constexpr float kFree = 0.1f;          // spacings: so deep may be what surface points carry
-constexpr float kShareOfPoints = 0.5f; // of the stiffness that a particle's surface points may have
+constexpr double kMostEdgeParts = 4096; // of an edge
+constexpr float kFree = 0.1f;           // spacings: so deep may be what surface points carry
+constexpr float kShareOfPoints = 0.5f;  // of the stiffness that a particle's surface points may have
 
 Index parts_of(const ObstacleShape::Edge& edge, double spacing) {
-    return Index(std::clamp(std::ceil((edge.to - edge.from).norm() / spacing), 1.0, kMostParts));
+    return Index(std::clamp(std::ceil((edge.to - edge.from).norm() / spacing), 1.0, kMostEdgeParts));
 }
 
 Vec3d point_of(const ObstacleShape::Edge& edge, Index part, Index parts) {
@@ -48,6 +48,34 @@ Index closest_cell(const Matter& matter, const Vectors& positions, const Vec3f& 
     return closest;
 }
 
+/// Whether an edge sticks out to the side that a body lies on: close to it, towards the body, the edge itself is the
+/// closest of the obstacle. The edges of a room stick out to nobody in it.
+bool sticks_out(const ObstacleShape& shape, const Vec3d& point, const Vec3d& body_centre, double spacing) {
+    constexpr double kClose = 0.05, kItself = 0.9;
+    const double close = kClose * spacing;
+    return shape.clearance(point + close * (body_centre - point).normalized(), close) > kItself * close;
+}
+
+/// Where cells are inverted or flat: the place by the linear map of the cell around that it is the least outside of.
+bool locate_roughly(const Matter& matter, const Vectors& positions, const Vec3f& point, Index around,
+                    Matter::Place& place, Mat3f& inverse) {
+    constexpr float kFlat = 0.2f, kFarthest = 1.5f; // of a cell's volume; cells from its middle
+    float least = kFarthest;
+    const auto& at = matter.body().cells.cells[around];
+    for (int n = 0; n < 27; ++n) {
+        const Index cell = matter.cell_at(at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1);
+        if (cell == kNoIndex || !(matter.volume_ratio(positions, cell) > kFlat)) continue;
+        const Matter::Linear map = matter.linear(positions, cell);
+        const Vec3f local = map.local(point);
+        const float outside = (local - Vec3f::Constant(0.5f)).cwiseAbs().maxCoeff();
+        if (!(outside < least)) continue;
+        least = outside;
+        place = {cell, local};
+        inverse = map.inverse;
+    }
+    return least < kFarthest;
+}
+
 /// Whether a place is within a cell, or nearly.
 bool is_in_matter(const Matter& matter, const Matter::Place& place) {
     const Vec3f margin = Vec3f::Constant(MatterContacts::kOutside);
@@ -75,7 +103,9 @@ void FeatureContacts::search(std::span<const BodyState> bodies, std::span<const 
                 const Index parts = parts_of(edges[e], spacing);
                 const auto [first, last] = parts_within(edges[e], parts, centre, radius);
                 for (Index part = first; part <= last && first <= last; ++part) {
-                    const Vec3f point = (poses.at(o) * point_of(edges[e], part, parts)).cast<float>();
+                    const Vec3d own = point_of(edges[e], part, parts);
+                    if (!sticks_out(shapes[o], own, centre, spacing)) continue;
+                    const Vec3f point = (poses.at(o) * own).cast<float>();
                     const Index cell = closest_cell(matter.matter(b), body.corner_positions(), point);
                     found.push_back({b, o, e, part, cell, Vec3f::Constant(0.5f), 0});
                 }
@@ -85,18 +115,17 @@ void FeatureContacts::search(std::span<const BodyState> bodies, std::span<const 
     near_ = std::move(found);
 }
 
-/// N/m of a point in a cell: as surface points have, and no more than the particles follow that carry it.
+/// N/m of a point in a cell: about as surface points have, and no more than the particles follow that carry it.
 float FeatureContacts::stiffness(const BodyState& body, const Matter& matter, const Matter::Place& place) const {
     if (body.surface_stiffness.empty()) return 0;
-    float mean = 0;
-    for (const float of_point : body.surface_stiffness) mean += of_point;
-    mean /= float(body.surface_stiffness.size());
-    if (matter.is_rigid()) return mean;
+    if (matter.is_rigid()) return body.surface_stiffness.front();
+    const double modulus = body.body->material.density * std::pow(pressure_wave_speed(body.body->material), 2);
+    float stiffness = float(modulus * body.body->spacing());
     for (const auto& [particle, weight] : carriers_of(body, matter, place))
         if (const float part = std::abs(weight); part > 1e-3f)
-            mean = std::min(mean, kShareOfPoints * kContactShare * body.rest_squared_frequency *
-                                      body.body->mass[particle] / part);
-    return mean;
+            stiffness = std::min(stiffness, kShareOfPoints * kContactShare * body.rest_squared_frequency *
+                                                body.body->mass[particle] / part);
+    return stiffness;
 }
 
 ContactReport FeatureContacts::add_forces(std::span<BodyState> bodies, std::span<const ObstacleShape> shapes,
@@ -114,7 +143,11 @@ ContactReport FeatureContacts::add_forces(std::span<BodyState> bodies, std::span
             (poses.at(near.obstacle) * point_of(edge, near.part, parts_of(edge, spacing))).cast<float>();
         Matter::Place place{near.cell, near.local};
         Mat3f inverse;
-        if (!of.locate(body.corner_positions(), point, place, inverse) || !is_in_matter(of, place)) {
+        const bool is_found =
+            of.locate(body.corner_positions(), point, place, inverse)
+                ? is_in_matter(of, place)
+                : !of.is_rigid() && locate_roughly(of, body.corner_positions(), point, near.cell, place, inverse);
+        if (!is_found) {
             near.clear_until = way + 0.05f * float(spacing);
             continue;
         }
@@ -125,6 +158,7 @@ ContactReport FeatureContacts::add_forces(std::span<BodyState> bodies, std::span
         Vec3f entry = Vec3f::Zero();
         if (velocity.norm() * dt > 0.25f * float(spacing)) entry = -(inverse * velocity).normalized();
         const std::optional<Matter::Depth> depth = of.depth(place, inverse, entry);
+        if (!of.is_rigid()) place.local = place.local.cwiseMax(0).cwiseMin(1); // what carries it
         const float deep = depth ? depth->depth - kFree * float(spacing) : 0;
         if (!(deep > 0)) {
             near.clear_until = way + (depth ? -0.5f * deep : 0.05f * float(spacing));
@@ -148,7 +182,8 @@ ContactReport FeatureContacts::add_forces(std::span<BodyState> bodies, std::span
         ++report.contacts;
         report.deepest = std::max(report.deepest, deep);
         if (deep > deepest)
-            deep_.push_back({near.body, place, depth->normal, poses.velocity(near.obstacle, point), deep - deepest});
+            deep_.push_back({near.body, place, depth->normal, poses.velocity(near.obstacle, point),
+                             std::min(deep - deepest, float(spacing))});
     }
     return report;
 }
@@ -173,7 +208,7 @@ bool FeatureContacts::is_sound(std::span<const Near> near, std::span<const BodyS
                                std::span<const ObstacleShape> shapes, const MatterContacts& matter) const {
     return std::ranges::all_of(near, [&](const Near& at) {
         return at.body < bodies.size() && at.obstacle < shapes.size() && matter.has_matter(at.body) &&
-               at.edge < shapes[at.obstacle].sharp_edges().size() && at.part <= kMostParts &&
+               at.edge < shapes[at.obstacle].sharp_edges().size() && at.part <= kMostEdgeParts &&
                at.cell < bodies[at.body].body->cells.cells.size() && at.local.allFinite() &&
                std::isfinite(at.clear_until);
     });

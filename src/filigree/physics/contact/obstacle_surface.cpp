@@ -11,7 +11,7 @@ namespace filigree {
 
 namespace {
 
-constexpr double kMargin = 1e-9;          // of the largest coordinate: rounding of doubles is far below it
+constexpr double kWallMargin = 1e-9;      // of the largest coordinate: rounding of doubles is far below it
 constexpr std::size_t kFewTriangles = 32; // to try all of them
 constexpr double kPieceEdges = 4;         // a long way is looked at in pieces of so many edges
 constexpr double kMostWayPieces = 256;
@@ -152,7 +152,7 @@ void ObstacleSurface::prepare() {
             box_.extend(positions_[v].cast<double>());
             largest = std::max(largest, double(positions_[v].cwiseAbs().maxCoeff()));
         }
-    margin_ = kMargin * largest;
+    margin_ = kWallMargin * largest;
     for (Index t = 0; t < triangles_.size(); ++t) {
         const auto [a, b, c] = corners(t);
         const Vec3d normal = (b - a).cross(c - a), unit = normal.stableNormalized();
@@ -228,14 +228,15 @@ void ObstacleSurface::each_near(const Vec3d& point, double radius, const Visit& 
     for (Index t = 0; t < triangles_.size(); ++t) visit(t);
 }
 
-/// Whether a point, moved along the triangle's normal, comes to lie in it; or by the margin beside it.
+/// Whether a point, moved along the triangle's normal, comes to lie in it; or a quarter of the margin beside it, so
+/// that nothing slips through between two, and places that go over an edge do not catch on the wall below it.
 bool ObstacleSurface::is_over(Index triangle, const Vec3d& point) const {
     const std::array<Vec3d, 3> of = corners(triangle);
     const Vec3d& normal = planes_[triangle].normal;
     for (std::size_t k = 0; k < 3; ++k) {
         const Vec3d edge = of[(k + 1) % 3] - of[k];
         const double within = normal.cross(edge).dot(point - of[k]);
-        if (within < 0 && within * within > margin_ * margin_ * edge.squaredNorm()) return false;
+        if (within < 0 && within * within > 0.0625 * margin_ * margin_ * edge.squaredNorm()) return false;
     }
     return true;
 }
