@@ -462,10 +462,10 @@ TEST_F(Simulate, TheManualShowsEveryKey) {
 TEST_F(Simulate, KeysThatDoNothingForAModelAreRefused) {
     for (const std::string key :
          {"temperature", "melting_from", "melting_to", "viscosity", "heating", "conductivity"}) {
-        const std::string needle =
-            "'" + key + "' in [[body]] is for model = \"meshfree\" or \"mpm\", and this body's is \"";
+        const std::string needle = "'" + key + "' in [[body]] is for model = \"mpm\", and this body's is \"";
         refused(kBody + key + " = 1\n", {"bad.toml:3: " + needle + "fem\"."});
         refused(kBody + "material = \"lattice\"\n" + key + " = 1\n", {"bad.toml:4: " + needle + "springs\"."});
+        refused(kBody + "material = \"clay\"\n" + key + " = 1\n", {"bad.toml:4: " + needle + "meshfree\"."});
         refused(kBody + "material = \"wax\"\nmodel = \"fem\"\n" + key + " = 1\n", {"bad.toml:5: " + needle});
     }
     refused(kBody + "material = \"lattice\"\nyield_stress = 1\n", {"bad.toml:4:", "'yield_stress'", "is \"springs\""});

@@ -53,8 +53,9 @@ TEST(Material, SaysWhatIsWrong) {
         {[=](Material& m) { m.heating = nan; }, "heating"},
         {[](Material& m) { m.conductivity = -1; }, "conductivity"},
         {[](Material& m) { m.model = MaterialModel::springs, m.yield_stress = 1e3; }, "fem"},
-        {[](Material& m) { m.model = MaterialModel::fem, m.melting_from = m.melting_to = 300; }, "meshfree"},
-        {[](Material& m) { m.model = MaterialModel::springs, m.melting_from = m.melting_to = 300; }, "meshfree"}};
+        {[](Material& m) { m.model = MaterialModel::fem, m.melting_from = m.melting_to = 300; }, "mpm"},
+        {[](Material& m) { m.model = MaterialModel::springs, m.melting_from = m.melting_to = 300; }, "mpm"},
+        {[](Material& m) { m.melting_from = m.melting_to = 300; }, "Only the model mpm melts"}};
     for (std::size_t c = 0; c < cases.size(); ++c) {
         Material material;
         material.model = MaterialModel::meshfree;

@@ -148,33 +148,6 @@ TEST(MatterContact, ABlockHoldsOnABodyAndSlidesBeyondItsAngle) {
     }
 }
 
-// Two meshfree bodies touch by balls.
-TEST(MatterContact, MeshfreeBodiesHoldEachOtherAndSlideBeyondTheirAngle) {
-    Material jelly = rubber(1e6, 0.5);
-    jelly.model = MaterialModel::meshfree;
-    for (const double degrees : {10.0, 20.0, 40.0}) {
-        Slope slope(degrees, true, 0.5, jelly, 20);
-        const std::size_t body = slope.add(block(4, 4, 4, 0.05, jelly), 0.1, 0.2, 0);
-        Simulation resting = begin(slope.world, slope.actors);
-        const auto run = [](Simulation& one, int frames) {
-            for (int frame = 0; frame < frames; ++frame) ASSERT_TRUE(one.advance(kOneThread).ok());
-        };
-        run(resting, degrees < 26 ? 240 : 20);
-        const std::string saved = resting.save();
-        const Vec3d before = centre_of_mass(resting, body);
-        run(resting, 30);
-        const double speed = 2 * (centre_of_mass(resting, body) - before).norm();
-        if (degrees < 26)
-            EXPECT_LT(speed, 1e-4) << degrees;
-        else
-            EXPECT_GT(speed, 0.1) << degrees;
-        Simulation again = begin(slope.world, slope.actors);
-        ASSERT_TRUE(again.restore(saved).ok());
-        run(again, 30);
-        EXPECT_TRUE(again.save() == resting.save()) << degrees << ": anchors are saved";
-    }
-}
-
 TEST(MatterContact, BodiesMeetWithoutPassingAndKeepMomentumAndEnergy) {
     const auto cube = block(6, 6, 6, 0.4 / 6, rubber());
     const double wave_speed = pressure_wave_speed(rubber()); // 36.7 m/s
@@ -333,52 +306,6 @@ TEST(MatterContact, AKoalasLegsStayOutOfEachOther) {
     RecordProperty("spacings", std::to_string(deepest / body->spacing()));
 }
 
-TEST(MatterContact, AMeshfreeBodyMeetsItself) {
-    FrameReport report;
-    EXPECT_LT(press(MaterialModel::meshfree, true, report), 0.03);
-    EXPECT_GT(press(MaterialModel::meshfree, false, report), 0.06) << "the scene asks nothing of contact";
-}
-
-TEST(MatterContact, AMeshfreeBodySavedWhileItMeetsItselfGoesOnTheSameForAnyThreads) {
-    const auto run = [](Simulation& one, int frames, unsigned threads) {
-        for (int frame = 0; frame < frames; ++frame) ASSERT_TRUE(one.advance(RunContext(threads)).ok());
-    };
-    Simulation whole = fork_between_palms(MaterialModel::meshfree, true);
-    run(whole, 50, 1);
-    const std::string saved = whole.save();
-    run(whole, 3, 1);
-    Simulation again = fork_between_palms(MaterialModel::meshfree, true);
-    ASSERT_TRUE(again.restore(saved).ok());
-    run(again, 3, 3);
-    EXPECT_TRUE(again.save() == whole.save());
-}
-
-// Balls that lie beside each other in one piece of matter do not push each other where it is squeezed.
-TEST(MatterContact, AMeshfreeBodyInOnePieceDoesNotMeetItself) {
-    Material jelly = rubber(1e5, 0.5);
-    jelly.model = MaterialModel::meshfree;
-    const auto drop = [&](bool touches_itself) {
-        World world;
-        Obstacle ground;
-        ground.shape = HalfSpace{Vec3d::Zero(), Vec3d::UnitY()};
-        world.obstacles.push_back(ground);
-        Simulation dropped = Simulation::create(world, {put(block(6, 6, 6, 0.05, jelly), {0, 0.2, 0}, 0, {0, -5, 0})},
-                                                {.contacts_within_bodies = touches_itself}, kOneThread)
-                                 .value();
-        double least = 1;
-        for (int frame = 0; frame < 12; ++frame) {
-            EXPECT_TRUE(dropped.advance(kOneThread).ok());
-            const Vectors& at = dropped.positions(0);
-            const auto [low, high] = std::minmax_element(at.y.begin(), at.y.begin() + std::ptrdiff_t(at.size()));
-            least = std::min(least, double(*high - *low));
-        }
-        return std::pair(least, std::vector(dropped.positions(0).x));
-    };
-    const auto [height, with] = drop(true);
-    EXPECT_LT(height, 0.8 * 0.25) << "the block is squeezed";
-    EXPECT_TRUE(with == drop(false).second);
-}
-
 TEST(MatterContact, FrictionMayDifferFromPairToPair) {
     Slope slope(20, true, 0.5);
     const std::size_t rough = slope.add(block(2, 2, 2, 0.1, rubber(1e6, 0.5)), 0.1002, 0.3, 0);
@@ -388,24 +315,6 @@ TEST(MatterContact, FrictionMayDifferFromPairToPair) {
     for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(both.advance(kOneThread).ok());
     EXPECT_LT(centre_of_mass(both, rough).dot(slope.down), -0.28);
     EXPECT_GT(centre_of_mass(both, smooth).dot(slope.down), 0.8);
-}
-
-// Meshfree bodies touch by balls; their pairs count as those of others do.
-TEST(MatterContact, APairOfMeshfreeBodiesHasItsOwnRestitution) {
-    Material clay = rubber(1e5);
-    clay.model = MaterialModel::meshfree;
-    const auto cube = block(3, 3, 3, 0.1, clay);
-    std::array<double, 2> parting;
-    for (const bool hard : {false, true}) {
-        World world;
-        world.gravity.setZero();
-        world.body_pairs.push_back({1, 0, {.friction = 0, .restitution = hard ? 1.0 : 0.0}});
-        Simulation meeting =
-            begin(world, {put(cube, {-0.2, 0, 0}, 0, {0.5, 0, 0}), put(cube, {0.2, 0, 0}, 0, {-0.5, 0, 0})});
-        for (int frame = 0; frame < 40; ++frame) ASSERT_TRUE(meeting.advance(kOneThread).ok());
-        parting[hard] = centre_of_mass(meeting, 1).x() - centre_of_mass(meeting, 0).x();
-    }
-    EXPECT_GT(parting[1], parting[0] + 0.02);
 }
 
 TEST(MatterContact, SavedWhileTouchingItGoesOnTheSameForAnyThreads) {

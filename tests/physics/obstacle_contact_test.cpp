@@ -278,7 +278,6 @@ TEST_P(EachModel, WhatStartsAcrossASheetComesOutWhereMostOfItIs) {
 
 /// What is thinner than the distance between surface points does not go in between them.
 TEST_P(EachModel, PostsAndKnivesHoldWhatFallsOnThem) {
-    if (GetParam() == MaterialModel::meshfree) GTEST_SKIP() << "has no cells that move";
     const auto body = ball_of(GetParam(), 1e6, 0.05);
     const std::vector<Named> things = {
         {"a post", of_box({0.011, -0.5, 0.013}, {0.004, 1, 0.004})},
@@ -293,7 +292,8 @@ TEST_P(EachModel, PostsAndKnivesHoldWhatFallsOnThem) {
                 run(sim, 1);
                 lowest = std::min(lowest, centre_of(sim).y());
             }
-            EXPECT_GT(lowest, 0.03) << name << " at " << speed;
+            const double least = GetParam() == MaterialModel::meshfree ? 0.01 : 0.03; // it gives way further
+            EXPECT_GT(lowest, least) << name << " at " << speed;
         }
 }
 

@@ -519,49 +519,6 @@ TEST(Simulation, WhatIsLostInAFrameIsHeldAndSaid) {
     EXPECT_TRUE(all_finite(broken.positions(0)));
 }
 
-// Wax that was thrown and flowed on its way: a hand at its end at rest pulls that end.
-
-TEST(Simulation, AHandPullsWaxThatHasFlowed) {
-    Material wax = material(MaterialModel::meshfree, 2e5);
-    wax.temperature = 400;
-    wax.melting_from = 300;
-    wax.melting_to = 350;
-    wax.viscosity = 100;
-    Actor bar = actor(box(9, 3, 3, 0.05, wax), {5, 0, 0});
-    bar.velocity = {1, 0, 0};
-    World world = with_ground();
-    const auto start = [&] { return simulation(world, {bar}); };
-    Simulation flowed = start();
-    const std::vector<Vec3f> end = {{0.45f, 0.075f, 0.075f}};
-    const std::size_t before = flowed.attach(0, end, RunContext(1));
-    run(flowed, 30);
-    const std::size_t after = flowed.attach(0, end, RunContext(1));
-    std::vector<Vec3f> one(1), other(1);
-    flowed.attached(before, one, {}, RunContext(1));
-    flowed.attached(after, other, {}, RunContext(1));
-    EXPECT_GT(one[0].x(), 5.2f);
-    EXPECT_LT((one[0] - other[0]).norm(), 0.05f); // a spacing
-
-    const std::string state = flowed.save();
-    Simulation pulled = start();
-    ASSERT_TRUE(pulled.restore(state).ok());
-    EXPECT_TRUE(state.size() > start().save().size()) << "it has not flowed";
-    Hand hand;
-    hand.point = end[0];
-    hand.target.constant = one[0].cast<double>() + Vec3d(0, 1, 0);
-    ASSERT_TRUE(pulled.set_hands({hand}, RunContext(1)).ok());
-    run(flowed, 1);
-    run(pulled, 1);
-    float near_end = 0, far_end = 0; // how much further up the hand had them
-    for (std::size_t i = 0; i < bar.body->particle_count(); ++i) {
-        const float up = pulled.positions(0).y[i] - flowed.positions(0).y[i];
-        float& most = bar.body->rest.x[i] > 0.225f ? near_end : far_end;
-        most = std::max(most, up);
-    }
-    EXPECT_GT(near_end, 1e-4f);
-    EXPECT_GT(near_end, 3 * far_end);
-}
-
 TEST(Simulation, ThrownClayStaysTogether) {
     const auto named = std::find_if(named_materials().begin(), named_materials().end(),
                                     [](const NamedMaterial& each) { return each.name == "clay"; });

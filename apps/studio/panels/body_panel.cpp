@@ -71,13 +71,11 @@ const Field<Body> kMeltingTo = {[](const Body& body) { return body.material.melt
 
 bool is_of_springs(const Body& body) { return body.material.model == MaterialModel::springs; }
 bool is_not_of_springs(const Body& body) { return !is_of_springs(body); }
-bool is_meshfree(const Body& body) { return body.material.model == MaterialModel::meshfree; }
-bool flows(const Body& body) { return is_meshfree(body) || body.material.model == MaterialModel::mpm; }
-bool may_yield(const Body& body) { return flows(body) || body.material.model == MaterialModel::fem; }
+bool is_of_mpm(const Body& body) { return body.material.model == MaterialModel::mpm; }
+bool may_yield(const Body& body) { return !is_of_springs(body) && body.material.model != MaterialModel::rigid; }
 bool is_plastic(const Body& body) { return may_yield(body) && body.material.is_plastic(); }
-bool creeps(const Body& body) { return is_plastic(body) && body.material.model != MaterialModel::mpm; }
-bool melts(const Body& body) { return flows(body) && body.material.melts(); }
-bool parts_and_joins(const Body& body) { return body.material.model == MaterialModel::mpm && body.material.melts(); }
+bool creeps(const Body& body) { return is_plastic(body) && !is_of_mpm(body); }
+bool melts(const Body& body) { return is_of_mpm(body) && body.material.melts(); }
 
 class BodyPanel : public Panel {
 public:
@@ -193,12 +191,12 @@ private:
                                  [](Body& body, double degrees) { body.air_temperature = degrees + kCelsius; }};
         number(rows,
                settings.setting("body.air", "Air", "How warm the air is, degrees Celsius; may change while it plays",
-                                air, parts_and_joins),
+                                air, melts),
                {.least = -150, .most = 1500, .step = 1, .decimals = 0, .unit = "°C"});
         number(rows,
                settings.setting("body.melting_time", "Melts in",
                                 "About how long all of it takes to melt in air 60 °C warmer than its melt, seconds",
-                                drop_field(&Body::melting_time), parts_and_joins),
+                                drop_field(&Body::melting_time), melts),
                {.least = 1, .most = 600, .decimals = 0, .unit = "s", .logarithmic = true});
         number(rows,
                settings.setting("body.friction", "Friction", "Coulomb's coefficient: 0 slides for ever",
@@ -221,10 +219,8 @@ private:
             number(rows, settings.setting(name, label, tooltip, of, is_shown), spec);
         };
         choice(rows,
-               settings.setting(
-                   "body.model", "Method",
-                   "How elasticity is computed. Meshfree flows and melts as one body; the grid method parts and joins.",
-                   kModel),
+               settings.setting("body.model", "Method",
+                                "How elasticity is computed. The grid method melts, parts and joins.", kModel),
                {"Finite elements", "Springs", "Meshfree", "Rigid", "Grid (mpm)"});
         add("body.poisson", "Poisson", material_field(&Material::poisson_ratio),
             {.least = 0, .most = 0.49, .step = 0.01, .decimals = 2},
@@ -246,7 +242,7 @@ private:
         add("body.creep", "Creep", material_field(&Material::creep_time),
             {.least = 0, .most = 1, .step = 0.01, .decimals = 2, .unit = "s"},
             "How fast stress beyond yield relaxes, seconds; 0: at once", creeps);
-        check(rows, settings.setting("body.melts", "Melts", "Stiff when cold, fluid when warm", kMelts, flows));
+        check(rows, settings.setting("body.melts", "Melts", "Stiff when cold, fluid when warm", kMelts, is_of_mpm));
         const NumberSpec temperature = {.least = -50, .most = 500, .step = 1, .decimals = 0, .unit = "°C"};
         add("body.melting_from", "Soft from", kMeltingFrom, temperature, "Stiff below, degrees Celsius", melts);
         add("body.melting_to", "Fluid from", kMeltingTo, temperature, "Fluid above, degrees Celsius", melts);

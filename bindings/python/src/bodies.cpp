@@ -119,8 +119,8 @@ name : str
 **changes : float or str
     What is otherwise: model ('fem', 'springs', 'meshfree', 'rigid' or 'mpm'), density (kg/m^3), young_modulus (Pa),
     poisson_ratio (0 to 0.49), damping (1/s), internal_damping (s), bending; of 'fem', 'meshfree' and 'mpm' yield_stress (Pa);
-    of 'fem' and 'meshfree' creep_time (s); of 'meshfree' and 'mpm' temperature, melting_from and melting_to (K), viscosity
-    (Pa s), heating (K/s), conductivity (m^2/s); of 'mpm' specific_heat (J/(kg K)), latent_heat (J/kg).
+    of 'fem' and 'meshfree' creep_time (s); of 'mpm' temperature, melting_from and melting_to (K), viscosity (Pa s), heating
+    (K/s), conductivity (m^2/s), specific_heat (J/(kg K)), latent_heat (J/kg).
 
 Raises
 ------

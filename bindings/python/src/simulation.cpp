@@ -130,6 +130,7 @@ py::dict said_of(const FrameReport& report) {
     said["deepest_contact"] = report.deepest_contact;
     said["deepest_in_matter"] = report.deepest_in_matter;
     said["least_volume_ratio"] = report.least_volume_ratio;
+    said["flowed_out"] = report.flowed_out;
     said["most_stretch"] = report.most_stretch;
     said["clamped_particles"] = report.clamped_particles;
     said["clamped_body"] = report.clamped_body;

@@ -95,21 +95,23 @@ std::size_t use_centroids(Body& body, const RunContext& context) {
     return split;
 }
 
-/// Fills rest, volume and mass. Returns how many cells were split.
+/// Fills rest, volume, mass and corners. Returns how many cells were split.
 std::size_t make_particles(Body& body, const RunContext& context) {
     std::size_t split = 0;
     if (uses_centroids(body.material.model))
         split = use_centroids(body, context);
     else
         use_corners(body);
+    if (body.material.model == MaterialModel::meshfree) body.corners = embed_corners(body.cells, body.rest, context);
     body.mass.resize(body.volume.size());
     for (std::size_t p = 0; p < body.mass.size(); ++p) body.mass[p] = float(body.material.density * body.volume[p]);
     return split;
 }
 
 Embedding embed_surface(std::span<const Vec3f> points, const Body& body, const RunContext& context) {
-    return uses_centroids(body.material.model) ? embed(points, body.rest, body.spacing(), context)
-                                               : embed_in_cells(points, body.cells, context);
+    if (body.material.model == MaterialModel::mpm) return embed(points, body.rest, body.spacing(), context);
+    const Embedding in_cells = embed_in_cells(points, body.cells, context);
+    return body.corners.size() == 0 ? in_cells : carried_on(in_cells, body.corners);
 }
 
 /// What make_particles would make.
@@ -206,7 +208,7 @@ double field_spacing(const Body& body) {
 
 /// The distance from the surface at rest. A mesh whose inside is thinner than cells can see counts as a sheet.
 Status add_field(Body& body, const Mesh& mesh, const RunContext& context) {
-    if (uses_centroids(body.material.model)) return Success{};
+    if (body.material.model == MaterialModel::mpm) return Success{};
     RunContext quiet = context;
     quiet.progress = nullptr;
     Result<DistanceField> field = DistanceField::create(mesh, body.scale, field_spacing(body), quiet);

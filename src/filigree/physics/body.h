@@ -31,10 +31,13 @@ struct Body {
     Vectors rest;
     std::vector<float> mass;   ///< kg
     std::vector<float> volume; ///< m^3: occupied, shared out as the mass is
+    /// meshfree: the corners of the cells, which carry the surface's points and are its matter for all that touches it,
+    /// and go along with the particles. Of others empty: the corners are the particles.
+    Embedding corners;
     BodySurface surface;
     /// Distance from the surface at rest, m, on a grid of half a spacing (wider for
     /// millions of cells): how deep what touches the body lies in it.
-    /// Null for meshfree bodies.
+    /// Null for bodies of mpm.
     std::shared_ptr<const DistanceField> field;
     float field_radius = 0; ///< m: a sheet without thickness is everything closer to it than this
 

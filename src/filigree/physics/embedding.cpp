@@ -131,9 +131,45 @@ private:
     const Cells* cells_;
 };
 
+/// The same for a corner of cells whose particles lie in them.
+class ReachedCells {
+public:
+    explicit ReachedCells(const Cells& cells) : cells_(cells) {}
+
+    /// Leaves the particles in the cells around the corner and in those next to these.
+    void keep(const Vec3d& corner, std::vector<ParticleGrid::Near>& near) const {
+        const Vec3d at = ((corner - cells_.origin) / cells_.spacing).array().round() - 2;
+        const std::array<int, 3> low = {int(at[0]), int(at[1]), int(at[2])};
+        std::array<bool, 64> exists, reached = {}; // cells low .. low + 3 along each axis
+        for (int n = 0; n < 64; ++n)
+            exists[n] = cells_.find_cell(low[0] + n % 4, low[1] + n / 4 % 4, low[2] + n / 16) != kNoIndex;
+        for (int n = 0; n < 8; ++n) { // around the corner
+            const int i = 1 + (n & 1), j = 1 + (n >> 1 & 1), k = 1 + (n >> 2);
+            if (!exists[number(i, j, k)]) continue;
+            for (int m = 0; m < 27; ++m) reached[number(i + m % 3 - 1, j + m / 3 % 3 - 1, k + m / 9 - 1)] = true;
+        }
+        std::erase_if(near, [&](const ParticleGrid::Near& particle) {
+            const Vec3d cell = ((particle.position - cells_.origin) / cells_.spacing).array().floor();
+            const int i = int(cell[0]) - low[0], j = int(cell[1]) - low[1], k = int(cell[2]) - low[2];
+            if (std::min({i, j, k}) < 0 || std::max({i, j, k}) > 3) return true;
+            return exists[number(i, j, k)] && !reached[number(i, j, k)]; // on a side it may count as beyond
+        });
+    }
+
+private:
+    static std::size_t number(int i, int j, int k) { return std::size_t(i + 4 * j + 16 * k); }
+
+    const Cells& cells_;
+};
+
+struct WeightLimits {
+    double floor = -std::numeric_limits<double>::infinity(); ///< linear only as far as no weight falls below
+    double lowest = kLeastWeight; ///< weight with which a point that none can carry well is still carried linearly
+};
+
 /// What the weights of one point are made of.
 struct Fit {
-    double floor = -std::numeric_limits<double>::infinity(); ///< linear only as far as no weight falls below
+    WeightLimits limits;
     std::vector<ParticleGrid::Near> near;
     std::vector<double> weights;
     double least = 0; ///< weight
@@ -184,7 +220,7 @@ private:
         double part = 1;
         for (std::size_t n = 0; n < near.size(); ++n) {
             const double plain = weights[n] / sum, change = weights[n] * slope.dot(near[n].position - middle);
-            if (plain + change < floor) part = std::min(part, (plain - floor) / -change);
+            if (plain + change < limits.floor) part = std::min(part, (plain - limits.floor) / -change);
         }
         return part;
     }
@@ -207,7 +243,8 @@ struct Piece {
     EmbeddingReport report;
 };
 
-void embed_point(const Vec3d& point, const ParticleGrid& grid, const ReachedCorners& reached, double spacing, Fit& fit,
+template <class Reached>
+void embed_point(const Vec3d& point, const ParticleGrid& grid, const Reached& reached, double spacing, Fit& fit,
                  Piece& piece) {
     const auto find = [&](double radius) {
         grid.find(point, radius, fit.near);
@@ -244,11 +281,11 @@ void embed_point(const Vec3d& point, const ParticleGrid& grid, const ReachedCorn
     }
     // Not to be had: what can be had from those around the nearest particle, and no slope where that shoots too far.
     piece.report.far_points += !far;
-    growth = 1;
+    growth = fit.limits.lowest < kLeastWeight ? std::pow(kRadiusGrowth, kAttempts - 1) : 1;
     const double radius = reach();
     find(radius);
     fit.solve(point, radius, true);
-    if (fit.least < kLeastWeight) {
+    if (fit.least < fit.limits.lowest) {
         double sum = 0;
         for (std::size_t n = 0; n < fit.near.size(); ++n) {
             const double s = 1 - fit.near[n].squared_distance / (radius * radius);
@@ -260,9 +297,9 @@ void embed_point(const Vec3d& point, const ParticleGrid& grid, const ReachedCorn
     accept();
 }
 
-Embedding embed_points(std::span<const Vec3f> points, const Vectors& rest, double spacing,
-                       const ReachedCorners& reached, double floor, const RunContext& context,
-                       EmbeddingReport* report) {
+template <class Reached>
+Embedding embed_points(std::span<const Vec3f> points, const Vectors& rest, double spacing, const Reached& reached,
+                       const WeightLimits& limits, const RunContext& context, EmbeddingReport* report) {
     Embedding embedding;
     embedding.rest.assign(points.begin(), points.end());
     embedding.offsets.assign(points.size() + 1, 0);
@@ -274,7 +311,7 @@ Embedding embed_points(std::span<const Vec3f> points, const Vectors& rest, doubl
     parallel_for(context, points.size(), kEmbeddingGrain, [&](std::size_t begin, std::size_t end) {
         Piece& piece = pieces[begin / kEmbeddingGrain];
         Fit fit;
-        fit.floor = floor;
+        fit.limits = limits;
         for (std::size_t p = begin; p < end; ++p)
             embed_point(points[p].cast<double>(), grid, reached, spacing, fit, piece);
     });
@@ -304,13 +341,23 @@ Embedding embed_points(std::span<const Vec3f> points, const Vectors& rest, doubl
 
 Embedding embed(std::span<const Vec3f> points, const Vectors& rest, double spacing, const RunContext& context,
                 EmbeddingReport* report) {
-    return embed_points(points, rest, spacing, ReachedCorners(nullptr), -std::numeric_limits<double>::infinity(),
-                        context, report);
+    return embed_points(points, rest, spacing, ReachedCorners(nullptr), {}, context, report);
 }
 
 Embedding embed_to_follow(std::span<const Vec3f> points, const Vectors& rest, double spacing, const Cells* cells,
                           const RunContext& context) {
-    return embed_points(points, rest, spacing, ReachedCorners(cells), kFollowingWeight, context, nullptr);
+    return embed_points(points, rest, spacing, ReachedCorners(cells), {.floor = kFollowingWeight}, context, nullptr);
+}
+
+Embedding embed_corners(const Cells& cells, const Vectors& rest, const RunContext& context) {
+    constexpr double kNearer = 0.7;         // radius: 1.2 spacings hold the particles of the cells around
+    constexpr double kLowestOfCorners = -4; // corners that do not follow would deform their cells
+    std::vector<Vec3f> corners;
+    corners.reserve(cells.corners.size());
+    for (const auto& index : cells.corners)
+        corners.push_back((cells.origin + cells.spacing * Vec3d(index[0], index[1], index[2])).cast<float>());
+    return embed_points(corners, rest, kNearer * cells.spacing, ReachedCells(cells), {.lowest = kLowestOfCorners},
+                        context, nullptr);
 }
 
 namespace {
@@ -372,6 +419,30 @@ Embedding embed_in_cells(std::span<const Vec3f> points, const Cells& cells, cons
         }
     });
     return embedding;
+}
+
+Embedding carried_on(const Embedding& points, const Embedding& carriers) {
+    Embedding result;
+    result.rest = points.rest;
+    std::vector<std::pair<Index, float>> parts;
+    for (std::size_t p = 0; p < points.size(); ++p) {
+        parts.clear();
+        for (Index k = points.offsets[p]; k < points.offsets[p + 1]; ++k)
+            for (Index n = carriers.offsets[points.particles[k]]; n < carriers.offsets[points.particles[k] + 1]; ++n)
+                if (const float weight = points.weights[k] * carriers.weights[n]; weight != 0)
+                    parts.emplace_back(carriers.particles[n], weight);
+        std::ranges::stable_sort(parts, {}, &std::pair<Index, float>::first);
+        const std::size_t first = result.particles.size();
+        for (const auto& [particle, weight] : parts) {
+            if (result.particles.size() == first || result.particles.back() != particle) {
+                result.particles.push_back(particle);
+                result.weights.push_back(0);
+            }
+            result.weights.back() += weight;
+        }
+        result.offsets.push_back(Index(result.particles.size()));
+    }
+    return result;
 }
 
 namespace {

@@ -43,6 +43,13 @@ Embedding embed_to_follow(std::span<const Vec3f> points, const Vectors& rest, do
 /// corners of cells.
 Embedding embed_in_cells(std::span<const Vec3f> points, const Cells& cells, const RunContext& context);
 
+/// Weights as those of `embed`, for the corners of cells whose particles lie in them; particles across a gap carry
+/// none. Of the particles of the cells around each corner, and more where those do not span space.
+Embedding embed_corners(const Cells& cells, const Vectors& rest, const RunContext& context);
+
+/// Points that go along with others, which go along with particles: by which particles, then.
+Embedding carried_on(const Embedding& points, const Embedding& carriers);
+
 /// Where the points went, and the deformation gradients there, by the Hermite form of docs/bodies-theory.md:
 ///     A = sum w F_j,   c' = sum w (x_j + 1/2 (F_j + A) (c - X_j)).
 /// An affine motion of the particles is followed exactly. `gradients` may be empty: not wanted. Cost O(weights).

@@ -34,9 +34,9 @@ std::string check_material(const Material& material) {
     if (!is_not_negative(material.conductivity)) return "The conductivity must be 0 m^2/s or more.";
     if (!is_positive(material.specific_heat)) return "The specific heat must be above 0 J/(kg K).";
     if (!is_not_negative(material.latent_heat)) return "The latent heat must be 0 J/kg or more.";
-    const bool flows = material.model == MaterialModel::meshfree || material.model == MaterialModel::mpm;
-    if (material.melts() && !flows) return "Only the models meshfree and mpm melt; take one, or leave melting out.";
-    if (material.is_plastic() && !flows && material.model != MaterialModel::fem)
+    if (material.melts() && material.model != MaterialModel::mpm)
+        return "Only the model mpm melts; take it, or leave melting out.";
+    if (material.is_plastic() && (material.model == MaterialModel::springs || material.model == MaterialModel::rigid))
         return "Only the models fem, meshfree and mpm yield; take one, or leave the yield stress out.";
     return "";
 }

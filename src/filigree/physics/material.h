@@ -7,8 +7,8 @@
 namespace filigree {
 
 /// How a body's elasticity is computed. fem: neo-Hookean on lattice cells. springs: a lattice of springs, Poisson's
-/// ratio 1/4 by construction. meshfree: moving least squares over neighbours [Mueller 2004]; flows as one body. rigid:
-/// does not deform; for what is too stiff or too small to be stepped as elastic. mpm: the material point method [Hu
+/// ratio 1/4 by construction. meshfree: moving least squares over neighbours at rest [Mueller 2004]. rigid: does
+/// not deform; for what is too stiff or too small to be stepped as elastic. mpm: the material point method [Hu
 /// 2018], for matter that melts, freezes, parts and joins.
 enum class MaterialModel { fem, springs, meshfree, rigid, mpm };
 
@@ -21,7 +21,7 @@ struct Material {
     double internal_damping = 0; ///< s: stress a rate of strain adds, as a multiple of stiffness (Kelvin-Voigt)
     double bending = 0.05;       ///< springs: share of an axis spring's stiffness given to bending springs, 0 .. 0.2
 
-    // Plasticity: fem, meshfree and mpm. Melting: meshfree and mpm.
+    // Plasticity: fem, meshfree and mpm. Heat and melting: mpm.
     static constexpr double kNever = std::numeric_limits<double>::infinity();
     double yield_stress = kNever; ///< Pa, of uniaxial stress (von Mises), above 0
     double creep_time = 0;        ///< s: stress beyond yield relaxes at this rate; 0: at once
@@ -31,8 +31,8 @@ struct Material {
     double viscosity = 10;        ///< Pa s, of the melt
     double heating = 0;           ///< K/s: ambient heating of the surface
     double conductivity = 0;      ///< m^2/s: thermal diffusivity inside
-    double specific_heat = 2000;  ///< mpm: J/(kg K), solid and fluid, above 0
-    double latent_heat = 0;       ///< mpm: J/kg that melting takes and freezing gives back
+    double specific_heat = 2000;  ///< J/(kg K), solid and fluid, above 0
+    double latent_heat = 0;       ///< J/kg that melting takes and freezing gives back
 
     bool operator==(const Material&) const = default;
 

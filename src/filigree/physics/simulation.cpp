@@ -17,8 +17,6 @@ namespace filigree {
 
 namespace {
 
-constexpr float kBallRadius = 0.4f; ///< spacings
-
 Error usage(std::string sentence) { return {ErrorCode::usage, std::move(sentence)}; }
 
 Status check_options(const StepOptions& options) {
@@ -47,7 +45,7 @@ BodyState place_body(const Actor& actor, std::size_t number) {
     return state;
 }
 
-BodyState begin_body(const Actor& actor, std::size_t number, bool with_balls, const RunContext& context) {
+BodyState begin_body(const Actor& actor, std::size_t number, const RunContext& context) {
     BodyState state = place_body(actor, number);
     const Body& body = *actor.body;
     const std::size_t count = body.particle_count();
@@ -63,8 +61,8 @@ BodyState begin_body(const Actor& actor, std::size_t number, bool with_balls, co
         state.rest_squared_frequency = kRigidSquaredFrequency;
         state.surface_stiffness = rigid_surface_stiffness(state);
     }
-    state.ball_radius = kBallRadius * float(body.spacing());
-    embed_surface_at_rest(state, with_balls && body.material.model == MaterialModel::meshfree, context);
+    state.surface = body.surface.points;
+    if (body.corners.size() != 0) state.corners.emplace(body.corners, count);
     if (!state.rigid) set_surface_stiffness(state);
     return state;
 }
@@ -129,8 +127,6 @@ bool has_cells(MaterialModel model) { return model == MaterialModel::fem || mode
 
 void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunContext& context) {
     AutomaticRigid automatic(state.world, state.options, actors);
-    const bool with_balls =
-        state.options.contacts_within_bodies || (state.options.contacts_between_bodies && actors.size() > 1);
     for (Actor& actor : actors) {
         const std::size_t number = state.bodies.size();
         if (state.grid->has(number)) {
@@ -138,11 +134,11 @@ void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunC
             state.why_rigid.emplace_back();
             continue;
         }
-        BodyState body = begin_body(actor, number, with_balls, context);
+        BodyState body = begin_body(actor, number, context);
         state.why_rigid.push_back(automatic.reason(number, body));
         if (!state.why_rigid.back().empty()) {
             actor.body = automatic.rigid(actor.body);
-            body = begin_body(actor, number, with_balls, context);
+            body = begin_body(actor, number, context);
         }
         if (has_cells(body.body->material.model)) find_light_corners(body);
         state.bodies.push_back(std::move(body));
@@ -157,7 +153,7 @@ void begin_pieces(SimulationState& state, std::span<const Actor> actors, const R
         state.bodies[a].broken = actors[a].fracture->body;
         state.bodies[a].first_piece = first;
         for (const std::shared_ptr<const Body>& piece : actors[a].fracture->body->pieces) {
-            state.bodies.push_back(begin_body({piece, actors[a].placement}, a, false, context));
+            state.bodies.push_back(begin_body({piece, actors[a].placement}, a, context));
             state.bodies.back().is_absent = true;
             find_light_corners(state.bodies.back());
         }
@@ -201,6 +197,19 @@ std::vector<Grip> make_grips(std::span<const Hand> hands, const SimulationState&
     return grips;
 }
 
+/// Where plastic strain has come to its limit.
+void note_flow(const SimulationState& state, FrameReport& report) {
+    std::size_t most = 0;
+    for (const BodyState& body : state.bodies) {
+        if (body.is_absent) continue;
+        const std::size_t count = body.elasticity->flowed_out();
+        report.flowed_out += count;
+        if (count <= most) continue;
+        most = count;
+        report.most_flowed = body.actor;
+    }
+}
+
 /// Substeps until the frame ends. What is not finite is held on the way, and the rest of the frame goes on from there;
 /// a state that is lost again and again stays as it is until the next frame. Returns how many particles were held.
 std::size_t step_bodies(SimulationState& state, double from, double until, FrameReport& report,
@@ -235,6 +244,7 @@ Result<FrameReport> step_frame(SimulationState& state, const RunContext& context
     report.clamped_particles += held;
     tell_first_lost(state, report);
     report.most_crushed = state.bodies[report.most_crushed].actor;
+    note_flow(state, report);
     for (const Cracks& cracks : state.cracks) cracks.show_whole(state.bodies);
     let_rest(state, from, until);
     ++state.frame;
@@ -296,6 +306,7 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
     begin_pins(*state);
     for (Cracks& cracks : state->cracks)
         if (!cracks.set_memory(cracks.memory(), state->bodies)) assert(false); // works out what follows from it
+    place_corners(state->bodies, context);
     state->contacts.begin(state->bodies);
     state->start_overlaps = find_start_overlaps(state->world, state->bodies);
     return Simulation(std::move(state));
@@ -453,7 +464,7 @@ std::size_t Simulation::attach_on_grid(std::size_t body, std::span<const Vec3f> 
     std::vector<Mat3f> gradients(points.size());
     fit_embedded(around, state.body->rest, state.positions, places, gradients, context);
     state_->first_tracers.push_back(state_->grid->add_tracers(body, places, gradients));
-    state_->attachments.push_back({body, {points.begin(), points.end()}, {}, {}});
+    state_->attachments.push_back({body, {points.begin(), points.end()}, {}});
     state_->followers.emplace_back();
     return state_->attachments.size() - 1;
 }

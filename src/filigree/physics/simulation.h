@@ -43,6 +43,10 @@ struct FrameReport {
     float least_volume_ratio = 1; ///< smallest J of all cells; 0 or less: inverted
     std::size_t most_crushed = 0; ///< the body that has it; below 0.1 explicit steps damp it a little
     float most_stretch = 1;
+    /// Cells and particles of plastic fem and meshfree that have flowed to seven times their length, and are elastic
+    /// from there on: what flows further is mpm's.
+    std::size_t flowed_out = 0;
+    std::size_t most_flowed = 0; ///< the body that has most of them
     double elastic_seconds = 0, contact_seconds = 0, other_seconds = 0;
     std::size_t clamped_particles = 0; ///< whose motion was not finite, or whose start was scaled down
     std::size_t clamped_body = 0;      ///< that the first of them is of
@@ -117,7 +121,7 @@ public:
     Status set_positions(std::size_t body, const Vectors& positions);
     Status set_velocities(std::size_t body, const Vectors& velocities);
     /// Hands may come and go while it runs, and take the place of those there were. Each seizes the particles that were
-    /// around its point at rest, wherever these have flowed. Errors: as check_hands; the old hands then stay.
+    /// around its point at rest. Errors: as check_hands; the old hands then stay.
     Status set_hands(std::vector<Hand> hands, const RunContext& context);
     /// Forces on a body's particles, N, from now on and in place of those set before; none at all: no such forces. A
     /// body that is pushed does not sleep. Of a body that broke the copies of a particle share its force by mass. Like
@@ -136,8 +140,8 @@ public:
     /// As a body's cells are now, pieces' included; of models without cells, and of rigid bodies, none. Cost O(cells).
     InvertedCells inverted(std::size_t body) const;
 
-    /// Points that go along with a body: its driver, or all of a mesh. Positions on the body at rest, m, also of a body
-    /// that has flowed since. Returns a number for `attached`. Cost: as embed.
+    /// Points that go along with a body: its driver, or all of a mesh. Positions on the body at rest, m.
+    /// Returns a number for `attached`. Cost: as embed.
     std::size_t attach(std::size_t body, std::span<const Vec3f> points, const RunContext& context);
     /// The same, each point with a piece, by the partition's number: what several pieces' copies of one point are
     /// carried by. Until the body breaks copies have the same bytes, and where pieces hold together also afterwards;

@@ -24,9 +24,16 @@ struct Inversion {
     void add(std::uint64_t frame, const InvertedCells& cells);
 };
 
+/// Cells or particles that have come to the limit of plastic strain.
+struct FlowedOut {
+    std::uint64_t first = 0; ///< frame
+    std::uint64_t most = 0;  ///< of them
+};
+
 struct BodyDoubts {
     std::optional<std::uint64_t> first_lost; ///< the first frame in which parts of the driver were held
     std::optional<Inversion> inversion;
+    std::optional<FlowedOut> flowed_out;
 };
 
 /// The first motion that was not finite or had to be limited.

@@ -282,16 +282,14 @@ private:
                                          kNames[std::size_t(model)]));
         };
         const bool is_mpm = model == MaterialModel::mpm;
-        if (model != MaterialModel::meshfree && !is_mpm)
-            for (const char* key :
-                 {"temperature", "melting_from", "melting_to", "viscosity", "heating", "conductivity"})
-                refuse(key, "\"meshfree\" or \"mpm\"");
         if (model == MaterialModel::springs || model == MaterialModel::rigid)
             refuse("yield_stress", "\"fem\", \"meshfree\" or \"mpm\"");
         if (model != MaterialModel::meshfree && model != MaterialModel::fem)
             refuse("creep_time", "\"fem\" or \"meshfree\"");
         if (!is_mpm)
-            for (const char* key : {"specific_heat", "latent_heat"}) refuse(key, "\"mpm\"");
+            for (const char* key : {"temperature", "melting_from", "melting_to", "viscosity", "heating", "conductivity",
+                                    "specific_heat", "latent_heat"})
+                refuse(key, "\"mpm\"");
         if (is_mpm) refuse("internal_damping", "\"fem\", \"springs\" or \"meshfree\"");
         if (model != MaterialModel::springs) refuse("bending", "\"springs\"");
         if (model == MaterialModel::springs) refuse("poisson_ratio", "\"fem\" or \"meshfree\"");
@@ -315,8 +313,7 @@ private:
         material.model = static_cast<MaterialModel>(in.word("model", static_cast<int>(material.model)));
         refuse_other_models(in, material.model);
         const MaterialModel model = material.model; // as another, a material that yields or melts does not
-        if (model != MaterialModel::meshfree && model != MaterialModel::mpm)
-            material.melting_from = material.melting_to = Material::kNever;
+        if (model != MaterialModel::mpm) material.melting_from = material.melting_to = Material::kNever;
         if (model == MaterialModel::springs || model == MaterialModel::rigid) material.yield_stress = Material::kNever;
         in.set("density", material.density);
         in.set("young_modulus", material.young_modulus);

@@ -126,6 +126,7 @@ Status SceneRun::advance_to(std::uint64_t last, const RunContext& context) {
         recording_.totals.add(*report);
         times_.add(*report);
         note_doubts(*report);
+        note_flow(*report);
         for (std::size_t b = 0; b < followers_.size(); ++b)
             if (const Status recorded = record_body(b); !recorded) return recorded;
     }
@@ -228,6 +229,13 @@ Vec3f SceneRun::middle_of(std::size_t body) const {
     return middle.cast<float>();
 }
 
+void SceneRun::note_flow(const FrameReport& report) {
+    if (report.flowed_out == 0) return;
+    std::optional<FlowedOut>& flowed = recording_.doubts[report.most_flowed].flowed_out;
+    if (!flowed) flowed = FlowedOut{.first = frame()};
+    flowed->most = std::max(flowed->most, std::uint64_t{report.flowed_out});
+}
+
 void SceneRun::check_body(std::size_t b) {
     const ReadyBody& body = ready_->bodies[b];
     const Follower& follower = followers_[b];
@@ -271,6 +279,7 @@ std::vector<std::string> SceneRun::warnings() const {
                                             "elastic",
                                             ready_->bodies[b].name, reason));
         add(inversion_warning(b));
+        add(flow_warning(b));
     }
     add(energy_warning());
     return sentences;
@@ -312,6 +321,14 @@ std::string SceneRun::inversion_warning(std::size_t b) const {
                        body.name, frames, inversion->worst, with_commas(inversion->cells),
                        with_commas(body.report.cells.cells), place_text(inversion->place),
                        body.body->material.young_modulus);
+}
+
+std::string SceneRun::flow_warning(std::size_t b) const {
+    const std::optional<FlowedOut>& flowed = recording_.doubts[b].flowed_out;
+    if (!flowed) return "";
+    return fmt::format("body '{}': {} of its cells or particles flowed to seven times their length, first in frame {}, "
+                       "and are elastic from there on; model = \"mpm\" is for matter that flows so far",
+                       ready_->bodies[b].name, with_commas(flowed->most), flowed->first);
 }
 
 std::string SceneRun::energy_warning() const {

@@ -58,11 +58,13 @@ private:
     void hold_lost_of(std::size_t body);
     void check_body(std::size_t body);
     void note_doubts(const FrameReport& report);
+    void note_flow(const FrameReport& report);
     void watch_energy();
     std::size_t fastest_body() const;
     Vec3f middle_of(std::size_t body) const;
     std::string place_text(const Vec3f& place) const;
     std::string inversion_warning(std::size_t body) const;
+    std::string flow_warning(std::size_t body) const;
     std::string loss_warning() const;
     std::string energy_warning() const;
 

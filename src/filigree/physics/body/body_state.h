@@ -1,6 +1,7 @@
 // A body on its way: what the stepper and contacts change. Private to the layer.
 #pragma once
 
+#include "filigree/physics/body/contact_corners.h"
 #include "filigree/physics/body/elasticity.h"
 #include "filigree/physics/broken_body.h"
 
@@ -51,23 +52,18 @@ struct BodyState {
     };
     std::vector<LightCorner> light_corners;
 
-    // Contact: points of the surface; meshfree bodies touch each other by balls just below them.
-    Embedding surface, balls; ///< in the elasticity's reference
+    /// What contact sees of the cells: of meshfree bodies corners of their own, else the particles.
+    std::optional<ContactCorners> corners;
+    const Vectors& corner_positions() const { return corners ? corners->positions() : positions; }
+    const Vectors& corner_velocities() const { return corners ? corners->velocities() : velocities; }
+    Vectors& corner_forces() { return corners ? corners->forces() : forces; }
+
+    Embedding surface; ///< points that touch
     /// Of each surface point, N/m: that of a spacing's depth of material under the point's area, bounded so that all
     /// points together add no more than kContactShare times the body's own squared frequency to any particle.
     std::vector<float> surface_stiffness;
-    float ball_radius = 0; ///< m
-    bool has_balls() const { return balls.size() != 0; }
     std::vector<std::uint8_t> hidden; ///< 1: a surface point on a crack that has not opened; empty: none
     bool is_hidden(std::size_t point) const { return !hidden.empty() && hidden[point]; }
-
-    /// Gradients from the body at rest to the elasticity's reference, one a particle: how matter has flowed until
-    /// neighbourhoods were last renewed. Empty: never; the reference is the body at rest.
-    std::vector<Mat3f> flow;
-    bool has_flowed() const { return !flow.empty(); }
-
-    /// What the particles' places are compared with: of a body on the grid, those at rest.
-    const Vectors& reference() const { return elasticity ? elasticity->reference() : body->rest; }
 };
 
 /// A gradient with its stretches within 1/4 and 4; the identity for one that is not finite.
@@ -87,24 +83,11 @@ void each_copy(std::span<State> bodies, std::size_t body, Index particle, const 
         visit(bodies[whole.first_piece + copy.piece], whole.first_piece + copy.piece, copy.corner);
 }
 
-/// Points of the body at rest, where they are in the elasticity's reference.
-struct PlacedPoints {
-    std::vector<Vec3f> places;
-    std::vector<Mat3f> gradients; ///< from rest to there, stretches within 1/4 and 4; empty: the body has not flowed
-};
-
-/// The door for all that is given as a point of the body at rest. A point goes with the particles that were around it
-/// at rest, or where these have come apart with the nearest of them.
-PlacedPoints place_in_reference(const BodyState& state, std::span<const Vec3f> rest_points, const RunContext& context);
-/// The same for the surface's points: their gradients alone, one at a time.
-Mat3f surface_flow(const BodyState& state, std::size_t point);
-
-/// Where points were put that others asked to be carried along.
+/// Points that others asked to be carried along.
 struct Attachment {
     std::size_t body = 0;
-    std::vector<Vec3f> points;    ///< of the body at rest
-    Embedding embedding;          ///< of the points where they are in the elasticity's reference
-    std::vector<Mat3f> gradients; ///< from rest to there; empty: the body had not flowed
+    std::vector<Vec3f> points; ///< of the body at rest
+    Embedding embedding;
 };
 Attachment attach(const BodyState& state, std::size_t body, std::span<const Vec3f> rest_points,
                   const RunContext& context);
@@ -112,11 +95,9 @@ Attachment attach(const BodyState& state, std::size_t body, std::span<const Vec3
 void move_attached(const BodyState& state, const Attachment& attachment, std::span<Vec3f> points,
                    std::span<Mat3f> gradients, const RunContext& context);
 
-/// Renews the elasticity's neighbourhoods where the particles are now; what is embedded in the body stays where it is.
-void renew_neighbourhoods(BodyState& state, std::span<Attachment* const> attachments, const RunContext& context);
-/// The surface's points and balls as they are on a body that has not flowed.
-void embed_surface_at_rest(BodyState& state, bool with_balls, const RunContext& context);
-/// For the particles that carry the surface's points now; not of a rigid body.
+/// Where the particles have the corners of cells that are not particles. Cost O(particles of meshfree bodies).
+void place_corners(std::span<BodyState> bodies, const RunContext& context);
+/// Not of a rigid body.
 void set_surface_stiffness(BodyState& state);
 
 Box box_of(const Vectors& positions); ///< at least one, all finite
@@ -155,8 +136,10 @@ inline void push_particle(BodyState& body, Index particle, float weight, const V
                           float most) {
     const float share = weight * body.inverse_mass[particle], asked = std::abs(share) * way.norm();
     const float moved = std::min(asked, most);
-    if (moved > 0) body.positions.add(particle, share * (moved / asked) * way);
+    const Vec3f step = moved > 0 ? Vec3f(share * (moved / asked) * way) : Vec3f(Vec3f::Zero());
+    body.positions.add(particle, step);
     body.velocities.add(particle, share * velocity);
+    if (body.corners) body.corners->follow(particle, step, share * velocity);
     body.pushed_way = std::max(body.pushed_way, moved);
 }
 

@@ -8,8 +8,7 @@
 namespace filigree {
 
 void Elasticity::finish_substep(const Vectors&, float, const RunContext&) {}
-bool Elasticity::wants_renewal() const { return false; }
-void Elasticity::renew(const Vectors&, const RunContext&) {}
+std::size_t Elasticity::flowed_out() const { return 0; }
 std::span<const PlasticCell> Elasticity::plastic_cells() const { return {}; }
 void Elasticity::take_over(std::span<const PlasticCell>, std::span<const Index>) {}
 std::string Elasticity::state() const { return {}; }

@@ -24,7 +24,7 @@ struct ElasticReport {
 };
 
 /// Elastic behaviour of one body: the body's arrays in the order its loops want, plus what is stored inside (plastic
-/// strain, temperature). The body must outlive it. Const functions may run at the same time; others use scratch.
+/// strain). The body must outlive it. Const functions may run at the same time; others use scratch.
 class Elasticity {
 public:
     virtual ~Elasticity() = default;
@@ -35,20 +35,13 @@ public:
     /// Elastic energy, J; 0 at rest.
     virtual double energy(const Vectors& positions, const RunContext& context) const = 0;
 
-    /// Positions that gradients are relative to: the body's rest positions, until neighbourhoods are renewed.
-    virtual const Vectors& reference() const = 0;
-    /// Deformation gradients at the particles, relative to reference().
+    /// Deformation gradients at the particles, from the body at rest.
     virtual void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext& context) const = 0;
 
-    /// After each substep: plastic flow, heat. Does nothing for elastic materials.
+    /// After each substep: plastic flow. Does nothing for elastic materials.
     virtual void finish_substep(const Vectors& positions, float dt, const RunContext& context);
-    /// Whether finish_substep found neighbourhoods so distorted that they should be renewed. Two calls, so that the
-    /// stepper can move what is embedded in the body by the old gradients first.
-    virtual bool wants_renewal() const;
-    /// Neighbours and weights anew: reference() becomes `positions`, gradients the identity; what is stored (elastic
-    /// strain, volume ratio) goes along, so forces stay what they were as nearly as may be. Positions that are not
-    /// finite leave everything as it is. Only for materials that flow.
-    virtual void renew(const Vectors& positions, const RunContext& context);
+    /// Cells or particles that have flowed as far as they may (kMostFlowed), and are elastic from there on.
+    virtual std::size_t flowed_out() const;
 
     /// fem that yields: what its cells remember; of other materials empty. A piece takes over that of `cells` of its
     /// whole.

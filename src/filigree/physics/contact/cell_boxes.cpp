@@ -26,15 +26,17 @@ CellBoxes::CellBoxes(const Matter& matter, const Vectors& positions, float reach
     std::vector<Extent> extents(cells.cells.size());
     Vec3f high = Vec3f::Constant(-std::numeric_limits<float>::max());
     low_ = -high;
+    bool is_finite = true; // least and most pass over what is no number
     for (Index c = 0; c < extents.size(); ++c) {
         Extent& extent = extents[c];
         extent = {CellBox(cells.cell_corners[c], positions), c};
         extent.low.array() -= reach;
         extent.high.array() += reach;
+        is_finite &= (extent.high - extent.low).allFinite();
         low_ = low_.cwiseMin(extent.low);
         high = high.cwiseMax(extent.high);
     }
-    if (!(high - low_).allFinite()) return; // the frame is done again
+    if (!is_finite || !(high - low_).allFinite()) return; // the frame is done again
     float step = kBoxSize * float(matter.body().spacing());
     around_ = 0.5f * kUsualCell * float(matter.body().spacing()) + reach;
     const auto boxes = [&] { return ((high - low_) / step).array().floor().cast<double>() + 1; };

@@ -2,8 +2,6 @@
 // restitution. Private to the layer.
 #pragma once
 
-#include "filigree/core/disjoint_sets.h"
-#include "filigree/mesh/incidence.h"
 #include "filigree/physics/body/body_state.h"
 #include "filigree/physics/contact/feature_contacts.h"
 #include "filigree/physics/contact/matter_contact.h"
@@ -11,8 +9,6 @@
 #include "filigree/physics/contact/start_sides.h"
 
 #include <algorithm>
-#include <array>
-#include <functional>
 #include <map>
 #include <memory>
 
@@ -27,32 +23,29 @@ public:
     void begin(std::span<const BodyState> bodies);
 
     /// Finds what might touch before anything has moved by the reaches, unless what was found last still holds: surface
-    /// points near obstacles and near cells of other bodies or far parts of their own, and pairs of balls of meshfree
-    /// bodies or of far parts of one.
+    /// points near obstacles and near cells of other bodies or far parts of their own.
     struct Search {
         double time;          ///< s
         float obstacle_reach; ///< m
-        float pair_reach;     ///< m, beside each other
         double frame;         ///< s: for about so long what is found is to hold
         float step_way = 0;   ///< m that anything may go towards an obstacle in the next step; it is found before
     };
     void search(std::span<BodyState> bodies, const Search& search, const RunContext& context);
     /// Before a frame of explicit steps.
-    void begin_frame(std::span<const BodyState> bodies, const RunContext& context) {
-        pairs_until_ = -1;
+    void begin_frame(std::span<BodyState> bodies, const RunContext& context) {
+        place_corners(bodies, context);
         matter_.begin_frame(bodies, context);
     }
     /// After a frame of explicit steps.
     void end_frame(std::span<const BodyState> bodies, const RunContext& context) { matter_.end_frame(bodies, context); }
     /// Positions have changed by dt times velocities. obstacle_way: m, bound on how far obstacles have gone.
-    void travel(std::span<const BodyState> bodies, float dt, float obstacle_way, const RunContext& context);
+    void travel(std::span<BodyState> bodies, float dt, float obstacle_way, const RunContext& context);
     /// m/s: bound on how fast particles go towards any obstacle, as of the last travel or begin_frame; but for light
     /// corners, which hardly move the surface.
     float approach_speed(std::span<const BodyState> bodies) const;
     /// A body's particles were moved by so much, m, beside their velocities.
     void was_moved(std::size_t body, float way) {
         near_way_ += way;
-        pairs_way_ += 2 * way;
         matter_.was_moved(body, way);
     }
     /// A body was put elsewhere: on which side of obstacles it is has to be found anew.
@@ -65,7 +58,7 @@ public:
     double longest_step() const { return matter_.longest_step(); }
     /// The next search finds everything again, and ways are counted from here; anchors and touches stay.
     void begin_anew() {
-        near_until_ = pairs_until_ = -1;
+        near_until_ = -1;
         matter_.begin_anew();
     }
     /// m/s: bound on how fast a body's particles go, as of the last travel or begin_frame.
@@ -100,8 +93,6 @@ public:
     template <class Visit>
     void each_holding(const Visit& visit) const {
         matter_.each_holding(visit);
-        for (const NearPair& pair : pairs_)
-            if (pair.grasp.holds && pair.first_body != pair.second_body) visit(pair.first_body, pair.second_body);
     }
 
     /// What the last add_forces may have added to the squared frequency of a body, in parts of that at rest. Two bodies
@@ -123,19 +114,12 @@ public:
         std::uint32_t unused = 0; ///< so that nothing is padding
         Vec3d place;              ///< Trace::place
     };
-    /// Two balls that friction holds together.
-    struct BallMemory {
-        Index first_body, first, second_body, second;
-        std::uint32_t slides;
-        Vec3f offset;
-    };
     /// All that contacts remember.
     struct Memory {
         std::vector<NearMemory> near; ///< ascending by body, obstacle and point
         float near_way = 0, near_until = -1;
         std::vector<std::uint8_t> seen; ///< of each body and obstacle: 1 once sides are known
         std::vector<FeatureContacts::Near> features;
-        std::vector<BallMemory> balls; ///< ascending
         MatterContacts::Memory matter;
     };
     Memory memory() const;
@@ -163,21 +147,6 @@ private:
         std::size_t blocks() const { return (points.size() + kBlock - 1) / kBlock; }
         void pad() { clear_until.resize(blocks() * kBlock, 0); }
     };
-    /// Two balls near each other, of different bodies or of far parts of one.
-    struct NearPair {
-        Index first_body, first, second_body, second;
-        float clear_until; ///< pairs_way_ until which these cannot touch
-        PairContact law;
-        contact_law::Grasp grasp = {};
-        Vec3f offset = Vec3f::Zero(); ///< m, along both: how far the first has slid from where it landed
-
-        std::array<Index, 4> key() const { return {first_body, first, second_body, second}; }
-    };
-    /// On the first of a pair. Friction acts between the surface points over the balls, which lie by each other where
-    /// these touch, so that it hardly turns what it holds.
-    struct PairForce {
-        Vec3f push = Vec3f::Zero(), friction = Vec3f::Zero();
-    };
     ContactReport add_obstacle_forces(BodyState& body, std::size_t b, const ObstaclePoses& poses, float dt,
                                       std::vector<Vec3f>& forces, std::vector<ContactPoint>& rigid,
                                       const RunContext& context);
@@ -190,11 +159,6 @@ private:
                                  const ObstaclePoses& poses) const;
     DistanceField::Sample surface_at(const Near& at, const NearPoints& of, const Vec3f& place,
                                      const ObstaclePoses& poses) const;
-    PairForce pair_force(NearPair& pair, std::span<const BodyState> bodies, float dt) const;
-    /// From the second's point to the first's, balls or surface points over them; of positions, or of velocities.
-    static Vec3f between(const NearPair& pair, std::span<const BodyState> bodies, Embedding BodyState::*points,
-                         const Vectors& of_first, const Vectors& of_second);
-    std::vector<NearPair> held_pairs() const; ///< those that friction holds, ascending
     void push_particles_out(BodyState& body, std::size_t b, std::size_t obstacle, const Vec3f& outwards,
                             const ObstaclePoses& poses, const RunContext& context);
     void find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context);
@@ -202,11 +166,8 @@ private:
     void forget_jumps(double time);
     std::vector<DistanceField::Sample> depths_of_particles(const BodyState& body, std::size_t b, std::size_t obstacle,
                                                            const ObstaclePoses& poses, const RunContext& context);
-    void find_pairs(std::span<const BodyState> bodies, float reach, const RunContext& context);
-    void find_own_pairs(const BodyState& body, Index number, const Vectors& balls, float reach);
 
     const World& world_;
-    bool between_bodies_, within_bodies_;
     std::vector<Vec3f> towards_;         ///< of each obstacle, the way to it: of half-spaces that stand still; else 0
     std::vector<NearPoints> near_;       ///< by body
     std::vector<float> deepest_near_;    ///< m, of each body, now
@@ -218,12 +179,8 @@ private:
     std::vector<ObstacleShape> shapes_;
     std::vector<std::uint8_t> seen_; ///< of each body and obstacle
     std::optional<double> time_;     ///< s, of the last search
-    std::vector<NearPair> pairs_;
-    struct OwnBalls;                                         ///< of a body whose balls meet each other
-    std::vector<std::shared_ptr<const OwnBalls>> own_balls_; ///< null: of the others
-    float near_way_ = 0;                       ///< m that anything may have come nearer to obstacles since ...
-    float pairs_way_ = 0;                      ///< ... and balls beside each other ...
-    float near_until_ = -1, pairs_until_ = -1; ///< ... and may go before they hold no more
+    float near_way_ = 0;             ///< m that anything may have come nearer to obstacles since ...
+    float near_until_ = -1;          ///< ... and may go before they hold no more
     static constexpr std::uint8_t kOnObstacle = 1, kInMatter = MatterContacts::kTouched,
                                   kInItself = MatterContacts::kTouchedItself;
     std::vector<std::uint8_t> touched_; ///< of each body

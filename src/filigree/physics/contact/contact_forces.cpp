@@ -21,18 +21,9 @@ constexpr float kCrushing = 0.5f; ///< spacings: what touches deeper may be crus
 constexpr float kInside = 2;      ///< spacings below the surface at rest: what lies deeper counts as this deep
 constexpr float kThinnest = 0.1f; ///< of their depth at rest, to which crushed parts are pressed
 
-/// Spacings of a particle below the surface at rest; corners of cells may lie outside, below 0. points: of the surface,
-/// for bodies without a field.
-float rest_depth(const Body& body, const Vec3f& particle, const PointGrid& points) {
-    const float spacing = float(body.spacing());
-    if (body.field) return (body.field_radius - body.field->at(particle).distance) / spacing;
-    // Particles of meshfree bodies lie inside; about so far from the surface's points are those at the surface.
-    constexpr float kBetween = 0.35f; // spacings
-    float depth = kInside;
-    points.near(particle, (kInside + kBetween) * spacing, [&](Index s) {
-        depth = std::min(depth, (body.surface.points.rest[s] - particle).norm() / spacing - kBetween);
-    });
-    return std::max(0.0f, depth);
+/// Spacings of a particle below the surface at rest; corners of cells may lie outside, below 0.
+float rest_depth(const Body& body, const Vec3f& particle) {
+    return body.field ? (body.field_radius - body.field->at(particle).distance) / float(body.spacing()) : kInside;
 }
 
 /// m that each particle may go into an obstacle: at the surface as deep as a penalty is trusted with, a spacing below
@@ -40,13 +31,10 @@ float rest_depth(const Body& body, const Vec3f& particle, const PointGrid& point
 std::vector<float> most_depths_of(const Body& body, const RunContext& context) {
     constexpr float kStretched = 2; // what is outside may be stretched
     const float spacing = float(body.spacing());
-    Vectors places(body.field ? 0 : body.surface.points.size());
-    for (std::size_t s = 0; s < places.size(); ++s) places.set(s, body.surface.points.rest[s]);
-    const PointGrid points(places, spacing);
     std::vector<float> most(body.particle_count());
     parallel_for(context, most.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            const float depth = rest_depth(body, body.rest[i], points);
+            const float depth = rest_depth(body, body.rest[i]);
             most[i] =
                 spacing * (depth < 0 ? kDeepest - kStretched * depth
                                      : kDeepest * std::max(0.0f, 1 - depth) - kThinnest * std::min(depth, kInside));
@@ -157,20 +145,10 @@ Vec3f Contacts::obstacle_force(Near& at, Trace* trace, float& clear_until, const
     return force;
 }
 
-Vec3f Contacts::between(const NearPair& pair, std::span<const BodyState> bodies, Embedding BodyState::*points,
-                        const Vectors& of_first, const Vectors& of_second) {
-    return embedded_point(bodies[pair.first_body].*points, pair.first, of_first) -
-           embedded_point(bodies[pair.second_body].*points, pair.second, of_second);
-}
-
-void Contacts::travel(std::span<const BodyState> bodies, float dt, float obstacle_way, const RunContext& context) {
-    for (NearPair& pair : pairs_)
-        if (pair.grasp.holds)
-            pair.offset += dt * between(pair, bodies, &BodyState::surface, bodies[pair.first_body].velocities,
-                                        bodies[pair.second_body].velocities);
+void Contacts::travel(std::span<BodyState> bodies, float dt, float obstacle_way, const RunContext& context) {
+    place_corners(bodies, context);
     matter_.travel(bodies, dt, context);
     near_way_ += dt * approach_speed(bodies) + obstacle_way;
-    pairs_way_ += dt * matter_.relative_speed_of_all([&](std::size_t b) { return bodies[b].has_balls(); });
 }
 
 float Contacts::approach_speed(std::span<const BodyState> bodies) const {
@@ -183,36 +161,6 @@ float Contacts::approach_speed(std::span<const BodyState> bodies) const {
         }
     }
     return most;
-}
-
-/// Lets friction's anchor begin, slide and end.
-Contacts::PairForce Contacts::pair_force(NearPair& pair, std::span<const BodyState> bodies, float dt) const {
-    if (pair.clear_until > pairs_way_) {
-        pair.grasp = {};
-        return {};
-    }
-    const BodyState &a = bodies[pair.first_body], &b = bodies[pair.second_body];
-    const Vec3f apart = between(pair, bodies, &BodyState::balls, a.positions, b.positions);
-    const float distance = apart.norm(), depth = a.ball_radius + b.ball_radius - distance;
-    pair.clear_until = pairs_way_ - depth;
-    if (!(depth > 0 && distance > 0)) {
-        pair.grasp = {};
-        return {};
-    }
-    const Vec3f normal = apart / distance;
-    const Vec3f closing = between(pair, bodies, &BodyState::balls, a.velocities, b.velocities);
-    const Vec3f slip = between(pair, bodies, &BodyState::surface, a.velocities, b.velocities);
-    const Touch touch{normal,
-                      closing.dot(normal) * normal + along_surface(slip, normal),
-                      depth,
-                      pair_stiffness(a, pair.first, b, pair.second),
-                      float(pair.law.friction),
-                      float(pair.law.restitution),
-                      std::max(a.rest_squared_frequency, b.rest_squared_frequency)};
-    pair.offset = along_surface(pair.offset, normal);
-    const Vec3f force = touch_force(touch, pair.offset, pair.grasp, dt, smooth_speed(world_, dt));
-    const Vec3f push = force.dot(normal) * normal;
-    return {push, force - push};
 }
 
 ContactPoint Contacts::contact_point(Near& at, const Vec3f& normal, Index b, const BodyState& body,
@@ -298,23 +246,6 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
     const ContactReport at_edges = features_.add_forces(bodies, shapes_, matter_, poses, dt, near_way_, touched_);
     report.contacts += at_edges.contacts;
     report.deepest = std::max(report.deepest, at_edges.deepest);
-    std::vector<PairForce> pair_forces(pairs_.size());
-    parallel_for(context, pairs_.size(), kContactForcesGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k) pair_forces[k] = pair_force(pairs_[k], bodies, dt);
-    });
-    for (std::size_t k = 0; k < pairs_.size(); ++k) {
-        const auto& [push, friction] = pair_forces[k];
-        if (push.isZero(0) && friction.isZero(0)) continue;
-        const NearPair& pair = pairs_[k];
-        BodyState &first = bodies[pair.first_body], &second = bodies[pair.second_body];
-        add_to_particles(first.balls, pair.first, push, first.forces);
-        add_to_particles(first.surface, pair.first, friction, first.forces);
-        add_to_particles(second.balls, pair.second, -push, second.forces);
-        add_to_particles(second.surface, pair.second, -friction, second.forces);
-        touched_[pair.first_body] |= kInMatter;
-        touched_[pair.second_body] |= kInMatter;
-        ++report.contacts;
-    }
     const ContactReport inside = matter_.add_forces(bodies, dt, touched_, rigid, context);
     report.contacts += inside.contacts;
     report.deepest_in_matter = inside.deepest_in_matter;
@@ -391,8 +322,7 @@ void Contacts::push_particles_out(BodyState& body, std::size_t b, std::size_t ob
     if (depths.most.empty()) depths = {most_depths_of(*body.body, context), near_surface_points(*body.body, context)};
     // distance: m beyond the limit, below 0
     std::vector<DistanceField::Sample> found = depths_of_particles(body, b, obstacle, poses, context);
-    for (std::size_t i = 0; i < found.size(); ++i)
-        found[i].distance += body.has_flowed() ? kDeepest * float(body.body->spacing()) : depths.most[i];
+    for (std::size_t i = 0; i < found.size(); ++i) found[i].distance += depths.most[i];
     for (Index i = 0; i < found.size(); ++i) {
         const auto& [distance, normal] = found[i];
         if (!(distance < 0) || normal.dot(outwards) < 0) continue;

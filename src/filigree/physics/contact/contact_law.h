@@ -26,11 +26,6 @@ inline float unloading(double restitution, float speed, float smooth_speed) {
 /// m/s; dt: of the substep.
 inline float smooth_speed(const World& world, float dt) { return 0.02f + 4 * dt * float(world.gravity.norm()); }
 
-/// N/m between two balls; a third, as a ball may touch several.
-inline float pair_stiffness(const BodyState& a, Index point_of_a, const BodyState& b, Index point_of_b) {
-    return std::min(a.surface_stiffness[point_of_a], b.surface_stiffness[point_of_b]) / 3;
-}
-
 inline Vec3f along_surface(const Vec3f& v, const Vec3f& normal) { return v - v.dot(normal) * normal; }
 
 /// `pull` shortened to Coulomb's limit.

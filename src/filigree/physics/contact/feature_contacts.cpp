@@ -94,7 +94,7 @@ void FeatureContacts::search(std::span<const BodyState> bodies, std::span<const 
     for (Index b = 0; b < bodies.size(); ++b) {
         const BodyState& body = bodies[b];
         if (body.is_absent || !matter.has_matter(b) || !body.body->field || !is_finite(body.positions)) continue;
-        const Box box = box_of(body.positions);
+        const Box box = box_of(body.corner_positions());
         const double radius = 0.5 * box.diagonal() + double(reach), spacing = body.body->spacing();
         for (Index o = 0; o < shapes.size(); ++o) {
             const std::span<const ObstacleShape::Edge> edges = shapes[o].sharp_edges();
@@ -106,7 +106,7 @@ void FeatureContacts::search(std::span<const BodyState> bodies, std::span<const 
                     const Vec3d own = point_of(edges[e], part, parts);
                     if (!sticks_out(shapes[o], own, centre, spacing)) continue;
                     const Vec3f point = (poses.at(o) * own).cast<float>();
-                    const Index cell = closest_cell(matter.matter(b), body.positions, point);
+                    const Index cell = closest_cell(matter.matter(b), body.corner_positions(), point);
                     found.push_back({b, o, e, part, cell, Vec3f::Constant(0.5f), 0});
                 }
             }
@@ -115,17 +115,16 @@ void FeatureContacts::search(std::span<const BodyState> bodies, std::span<const 
     near_ = std::move(found);
 }
 
-/// N/m of a point in a cell: about as surface points have, and no more than the cell's corners follow.
+/// N/m of a point in a cell: about as surface points have, and no more than the particles follow that carry it.
 float FeatureContacts::stiffness(const BodyState& body, const Matter& matter, const Matter::Place& place) const {
     if (body.surface_stiffness.empty()) return 0;
     if (matter.is_rigid()) return body.surface_stiffness.front();
     const double modulus = body.body->material.density * std::pow(pressure_wave_speed(body.body->material), 2);
     float stiffness = float(modulus * body.body->spacing());
-    const Matter::Weights weights = matter.weights(place);
-    for (int c = 0; c < 8; ++c)
-        if (const float weight = std::abs(weights[c]); weight > 1e-3f)
+    for (const auto& [particle, weight] : carriers_of(body, matter, place))
+        if (const float part = std::abs(weight); part > 1e-3f)
             stiffness = std::min(stiffness, kShareOfPoints * kContactShare * body.rest_squared_frequency *
-                                                body.body->mass[matter.corners(place.cell)[c]] / weight);
+                                                body.body->mass[particle] / part);
     return stiffness;
 }
 
@@ -145,16 +144,16 @@ ContactReport FeatureContacts::add_forces(std::span<BodyState> bodies, std::span
         Matter::Place place{near.cell, near.local};
         Mat3f inverse;
         const bool is_found =
-            of.locate(body.positions, point, place, inverse)
+            of.locate(body.corner_positions(), point, place, inverse)
                 ? is_in_matter(of, place)
-                : !of.is_rigid() && locate_roughly(of, body.positions, point, near.cell, place, inverse);
+                : !of.is_rigid() && locate_roughly(of, body.corner_positions(), point, near.cell, place, inverse);
         if (!is_found) {
             near.clear_until = way + 0.05f * float(spacing);
             continue;
         }
         near.cell = place.cell;
         near.local = of.is_rigid() ? Vec3f(Vec3f::Zero()) : place.local;
-        const Vec3f velocity = poses.velocity(near.obstacle, point) - of.mean(place, body.velocities);
+        const Vec3f velocity = poses.velocity(near.obstacle, point) - of.mean(place, body.corner_velocities());
         // Where it came in, if it came so far in this step that the closest surface may be another one.
         Vec3f entry = Vec3f::Zero();
         if (velocity.norm() * dt > 0.25f * float(spacing)) entry = -(inverse * velocity).normalized();
@@ -178,7 +177,7 @@ ContactReport FeatureContacts::add_forces(std::span<BodyState> bodies, std::span
         Vec3f offset = Vec3f::Zero();
         const Vec3f slip = along_surface(velocity, depth->normal);
         if (slip.norm() > 0) offset = slip.normalized() * touch.friction * touch.depth / kTangentialStiffness;
-        of.add(place, -touch_force(touch, offset, grasp, dt, smooth_speed(world_, dt)), body.forces);
+        of.add(place, -touch_force(touch, offset, grasp, dt, smooth_speed(world_, dt)), body.corner_forces());
         touched[near.body] |= MatterContacts::kTouched;
         ++report.contacts;
         report.deepest = std::max(report.deepest, deep);
@@ -193,15 +192,15 @@ void FeatureContacts::push_out(std::span<BodyState> bodies, const MatterContacts
     for (const Deep& deep : deep_) {
         BodyState& body = bodies[deep.body];
         const Matter& of = matter.matter(deep.body);
-        const Matter::Weights weights = of.weights(deep.place);
-        const std::array<Index, 8>& corners = of.corners(deep.place.cell);
+        const std::vector<Carrier> carriers = carriers_of(body, of, deep.place);
         float gives = 0;
-        for (int c = 0; c < 8; ++c) gives += weights[c] * weights[c] * body.inverse_mass[corners[c]];
+        for (const auto& [particle, weight] : carriers) gives += weight * weight * body.inverse_mass[particle];
         if (!(gives > 0)) continue;
-        const float inwards = std::max(0.0f, (of.mean(deep.place, body.velocities) - deep.velocity).dot(deep.normal));
+        const float inwards =
+            std::max(0.0f, (of.mean(deep.place, body.corner_velocities()) - deep.velocity).dot(deep.normal));
         const Vec3f way = -deep.depth / gives * deep.normal, push = -inwards / gives * deep.normal;
-        for (int c = 0; c < 8; ++c)
-            if (weights[c] != 0) push_particle(body, corners[c], weights[c], way, push, deep.depth);
+        for (const auto& [particle, weight] : carriers)
+            if (weight != 0) push_particle(body, particle, weight, way, push, deep.depth);
     }
 }
 

@@ -9,7 +9,7 @@
 namespace filigree {
 
 /// Points along the sharp edges of obstacles, as far apart as a body's spacing, are pushed out of the body's matter;
-/// the body takes the force. Of fem, springs and rigid bodies: others have no cells that move.
+/// the body takes the force. Of all bodies that have cells: not of those on the grid.
 class FeatureContacts {
 public:
     explicit FeatureContacts(const World& world) : world_(world) {}

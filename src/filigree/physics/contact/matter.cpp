@@ -120,7 +120,7 @@ void Matter::find_cells_of_points() {
     }
 }
 
-/// By the particles that the point is embedded in: the corners of a cell, or of meshfree bodies those of cells around.
+/// By the particles that the point is embedded in: the corners of a cell, or of meshfree bodies in cells around.
 Index Matter::carrying_cell(std::size_t surface_point) const {
     const Embedding& points = body_.surface.points;
     const Index first = points.offsets[surface_point], last = points.offsets[surface_point + 1];

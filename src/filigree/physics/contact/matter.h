@@ -13,8 +13,7 @@ namespace filigree {
 /// [Fisher 2001, McAdams 2011].
 class Matter {
 public:
-    /// body: outlives this. Of a meshfree one, whose particles are not the corners of its cells, only the cells at rest
-    /// are asked for: are_together, are_in_three_steps, cell_at, cell_of_point, rest_position.
+    /// body: outlives this. Positions are those of the corners of its cells: of the particles, or of Body::corners.
     explicit Matter(const Body& body);
     /// A rigid body is one cell that goes on as far as one likes.
     bool is_rigid() const { return is_rigid_; }

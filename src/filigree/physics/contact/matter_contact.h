@@ -21,11 +21,20 @@ struct ContactReport {
     float deepest_in_matter = 0;
 };
 
+/// A particle and its part in how a place in matter moves.
+struct Carrier {
+    Index particle;
+    float weight;
+};
+/// The particles that move a place in matter, each once.
+std::vector<Carrier> carriers_of(const BodyState& body, const Matter& matter, const Matter::Place& place);
+
 class CellBoxes;
 
 /// Each surface point that lies in a cell of another body, or of a far part of its own, is pushed out along the normal
 /// of that matter's surface, and held by friction to the place in that matter where it landed. What pushes the point
-/// pushes the cell's corners back at the same place, so that momentum and angular momentum stay what they were.
+/// pushes the cell's corners (BodyState::corners) back at the same place, so that momentum and angular momentum stay
+/// what they were.
 class MatterContacts {
 public:
     static constexpr float kMostReach = 0.5f; ///< spacings that near bodies may go between two searches, at most
@@ -35,7 +44,7 @@ public:
     MatterContacts(const World& world, std::size_t actors, bool between_bodies, bool within_bodies)
         : world_(world), laws_(world, actors), between_bodies_(between_bodies), within_bodies_(within_bodies) {}
 
-    /// Once, when all bodies are there. Meshfree bodies have no cells that move, and take no part.
+    /// Once, when all bodies are there.
     void begin(std::span<const BodyState> bodies);
 
     /// The next search finds everything again; what touches is remembered.
@@ -203,22 +212,22 @@ private:
     const World& world_;
     const PairLaws laws_;
     bool between_bodies_, within_bodies_;
-    std::vector<std::shared_ptr<const Matter>> matter_;      ///< null: of meshfree bodies
+    std::vector<std::shared_ptr<const Matter>> matter_;      ///< null: of bodies without a field
     std::vector<std::vector<float>> per_area_;               ///< N/m^3 in each cell of each body
     std::vector<std::shared_ptr<const OwnCells>> own_cells_; ///< null: of bodies that do not meet themselves
     std::vector<std::uint8_t> recovers_;                     ///< of each body: 1 while it does not meet itself
-    struct Followed {              ///< the particles of a body whose motion says when to search again
-        std::vector<float> counts; ///< of each particle, as extremes_of wants them
+    struct Followed {              ///< the corners of a body's cells whose motion says when to search again
+        std::vector<float> counts; ///< of each, as extremes_of wants them
         Index heaviest = 0;
         std::vector<Index> corners;      ///< of a rigid body, instead: those that all others lie between
-        bool has_points_outside = false; ///< of the particles' box at rest; unknown of a rigid body
+        bool has_points_outside = false; ///< of the cells' box at rest; unknown of a rigid body
     };
     static Followed followed(const BodyState& body);
     Extremes extremes(std::size_t body, const Vectors& values, const Vectors* from) const;
     Box extent(const BodyState& body, std::size_t number) const;
     std::vector<std::shared_ptr<const Followed>> followed_;
     std::vector<Extremes> speeds_;
-    std::vector<Vectors> places_;  ///< of each body's particles, where its shifts are counted from
+    std::vector<Vectors> places_;  ///< of the corners of each body's cells, where its shifts are counted from
     std::vector<Extremes> shifts_; ///< m
     std::vector<Side> sides_;      ///< ascending by bodies
     float way_ = 0, sides_until_ = -1;

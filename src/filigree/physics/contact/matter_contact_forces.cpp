@@ -21,6 +21,29 @@ constexpr float kClearerOfRigid = 0.8f; ///< part of a distance from a rigid bod
 
 } // namespace
 
+std::vector<Carrier> carriers_of(const BodyState& body, const Matter& matter, const Matter::Place& place) {
+    const Matter::Weights weights = matter.weights(place);
+    const auto& corners = matter.corners(place.cell);
+    std::vector<Carrier> carriers;
+    if (!body.corners) {
+        for (int c = 0; c < 8; ++c) carriers.push_back({corners[c], weights[c]});
+        return carriers;
+    }
+    const Embedding& carried = body.body->corners;
+    for (int c = 0; c < 8; ++c)
+        for (Index k = carried.offsets[corners[c]]; k < carried.offsets[corners[c] + 1]; ++k)
+            carriers.push_back({carried.particles[k], weights[c] * carried.weights[k]});
+    std::ranges::stable_sort(carriers, {}, &Carrier::particle);
+    std::size_t kept = 0;
+    for (std::size_t k = 1; k < carriers.size(); ++k)
+        if (carriers[k].particle == carriers[kept].particle)
+            carriers[kept].weight += carriers[k].weight;
+        else
+            carriers[++kept] = carriers[k];
+    carriers.resize(std::min(kept + 1, carriers.size()));
+    return carriers;
+}
+
 void MatterContacts::leave(Pair& pair, const Side& side, float clearance) const {
     pair.depth = 0;
     pair.grasp = {};
@@ -37,7 +60,7 @@ float MatterContacts::clearance(const Pair& pair, const Side& side, float distan
     if (safe == 0) return 0;
     const BodyState &body = bodies[side.body], &other = bodies[side.other];
     const Vec3f velocity = embedded_point(body.surface, pair.point, body.velocities) -
-                           matter_[side.other]->mean(pair.place, other.velocities);
+                           matter_[side.other]->mean(pair.place, other.corner_velocities());
     return safe * side.speed / (velocity.norm() + slowest * side.speed);
 }
 
@@ -83,12 +106,12 @@ std::optional<Vec3f> MatterContacts::enter(Pair& pair, const Side& side, std::sp
     const float slowest = beside ? kSlowestBeside : kSlowest;
     std::optional<Matter::Depth> found;
     if (Mat3f inverse; !(beside && pair.entry.isZero(0)) && // its walk would end at its own place
-                       matter.locate(other.positions, point, pair.place, inverse) &&
+                       matter.locate(other.corner_positions(), point, pair.place, inverse) &&
                        !(own && !is_elsewhere(pair, pair.place, matter)))
         found = matter.depth(pair.place, inverse, pair.entry);
     if (own && !found) {
         pair.place.cell = from;
-        found = find_fold(pair, point, matter, body.positions, pair.place);
+        found = find_fold(pair, point, matter, body.corner_positions(), pair.place);
     }
     if (!found) {
         pair.place.local.setConstant(0.5f);
@@ -128,15 +151,16 @@ Vec3f MatterContacts::force(Pair& pair, const Side& side, std::span<const BodySt
     const Matter& matter = *matter_[side.other];
     const Touch touch{*normal,
                       embedded_point(body.surface, pair.point, body.velocities) -
-                          matter.mean(pair.place, other.velocities),
+                          matter.mean(pair.place, other.corner_velocities()),
                       pair.depth,
                       stiffness(side, pair, bodies),
                       float(side.law.friction),
                       float(side.law.restitution),
                       std::max(body.rest_squared_frequency, other.rest_squared_frequency)};
-    const Vec3f place = matter.mean(pair.place, other.positions);
+    const Vec3f place = matter.mean(pair.place, other.corner_positions());
     Vec3f offset = Vec3f::Zero();
-    if (pair.grasp.holds) offset = along_surface(place - matter.mean(pair.anchor, other.positions), touch.normal);
+    if (pair.grasp.holds)
+        offset = along_surface(place - matter.mean(pair.anchor, other.corner_positions()), touch.normal);
     const bool landed = !pair.grasp.holds;
     const Vec3f force = touch_force(touch, offset, pair.grasp, dt, smooth_speed(world_, dt));
     if (landed || pair.grasp.slides) anchor_at(pair, side, other, offset);
@@ -182,7 +206,7 @@ void MatterContacts::add_contact_point(Pair& pair, const Side& side, std::span<c
 void MatterContacts::anchor_at(Pair& pair, const Side& side, const BodyState& other, const Vec3f& offset) const {
     pair.anchor = pair.place;
     if (!offset.isZero(0))
-        pair.anchor.local -= matter_[side.other]->inverse_derivative(other.positions, pair.place) * offset;
+        pair.anchor.local -= matter_[side.other]->inverse_derivative(other.corner_positions(), pair.place) * offset;
 }
 
 ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
@@ -207,7 +231,7 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         if (!(depth > 0)) continue;
         if (!side.is_rigid) {
             add_to_particles(bodies[side.body].surface, pair.point, force, bodies[side.body].forces);
-            matter_[side.other]->add(pair.place, -force, bodies[side.other].forces);
+            matter_[side.other]->add(pair.place, -force, bodies[side.other].corner_forces());
         }
         touched[side.body] |= touch_of(side);
         touched[side.other] |= touch_of(side);
@@ -215,6 +239,9 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         report.deepest_in_matter = std::max(report.deepest_in_matter, depth);
         is_too_deep_ |= !side.is_rigid && depth > most_depth(side);
     }
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+        if (bodies[b].corners && touched[b] & (kTouched | kTouchedItself))
+            bodies[b].corners->give_forces(bodies[b].forces, context);
     return report;
 }
 
@@ -234,18 +261,17 @@ void MatterContacts::push_out(Pair& pair, const Side& side, std::span<BodyState>
     if (!normal || !(too_deep > 0)) return;
     BodyState &body = bodies[side.body], &other = bodies[side.other];
     const Matter& matter = *matter_[side.other];
-    const Matter::Weights weights = matter.weights(pair.place);
-    const auto& corners = matter.corners(pair.place.cell);
+    const std::vector<Carrier> carriers = carriers_of(other, matter, pair.place);
     float gives = yielding(body.surface, pair.point, body.inverse_mass);
-    for (int c = 0; c < 8; ++c) gives += weights[c] * weights[c] * other.inverse_mass[corners[c]];
+    for (const auto& [particle, weight] : carriers) gives += weight * weight * other.inverse_mass[particle];
     if (!(gives > 0)) return;
     const Vec3f velocity =
-        embedded_point(body.surface, pair.point, body.velocities) - matter.mean(pair.place, other.velocities);
+        embedded_point(body.surface, pair.point, body.velocities) - matter.mean(pair.place, other.corner_velocities());
     const Vec3f way = too_deep / gives * *normal;
     const Vec3f push = std::max(0.0f, -velocity.dot(*normal)) / gives * *normal;
     for (Index k = body.surface.offsets[pair.point]; k < body.surface.offsets[pair.point + 1]; ++k)
         push_particle(body, body.surface.particles[k], body.surface.weights[k], way, push, too_deep);
-    for (int c = 0; c < 8; ++c) push_particle(other, corners[c], -weights[c], way, push, too_deep);
+    for (const auto& [particle, weight] : carriers) push_particle(other, particle, -weight, way, push, too_deep);
 }
 
 } // namespace filigree

@@ -37,27 +37,33 @@ std::vector<float> stiffness_per_area(const BodyState& state) {
         stiffness += double(state.surface_stiffness[s]);
         area += double(state.body->surface.areas[s]);
     }
-    std::vector<float> at_corner(state.positions.size(), area > 0 ? float(stiffness / area) : 0);
+    std::vector<float> at_particle(state.positions.size(), area > 0 ? float(stiffness / area) : 0);
     for (std::size_t s = 0; s < points.size(); ++s)
         for (Index k = points.offsets[s]; k < points.offsets[s + 1]; ++k) {
-            float& corner = at_corner[points.particles[k]];
-            corner = std::min(corner, state.surface_stiffness[s] / state.body->surface.areas[s]);
+            float& particle = at_particle[points.particles[k]];
+            particle = std::min(particle, state.surface_stiffness[s] / state.body->surface.areas[s]);
         }
+    const Embedding& carried = state.body->corners;
+    std::vector<float> at_corner(carried.size(), std::numeric_limits<float>::max());
+    for (std::size_t c = 0; c < at_corner.size(); ++c)
+        for (Index k = carried.offsets[c]; k < carried.offsets[c + 1]; ++k)
+            at_corner[c] = std::min(at_corner[c], at_particle[carried.particles[k]]);
+    if (at_corner.empty()) at_corner = std::move(at_particle);
     std::vector<float> in_cell(cells.cells.size(), std::numeric_limits<float>::max());
     for (std::size_t c = 0; c < in_cell.size(); ++c)
         for (const Index corner : cells.cell_corners[c]) in_cell[c] = std::min(in_cell[c], at_corner[corner]);
     return in_cell;
 }
 
-/// Where particles will be in so many seconds.
+/// Where corners will be in so many seconds.
 Vectors positions_in(const BodyState& body, float seconds) {
-    Vectors positions = body.positions;
+    Vectors positions = body.corner_positions();
     const auto move = [&](std::vector<float>& x, const std::vector<float>& v) {
         for (std::size_t i = 0; i < x.size(); ++i) x[i] += seconds * v[i];
     };
-    move(positions.x, body.velocities.x);
-    move(positions.y, body.velocities.y);
-    move(positions.z, body.velocities.z);
+    move(positions.x, body.corner_velocities().x);
+    move(positions.y, body.corner_velocities().y);
+    move(positions.z, body.corner_velocities().z);
     return positions;
 }
 
@@ -76,9 +82,11 @@ std::vector<Vec3f> surface_places(const BodyState& body, const RunContext& conte
     return places;
 }
 
-/// Whether surface points lie outside of the box of the particles: of meshfree bodies, and of parts without cells.
+/// Whether surface points lie outside of the box of the cells: of parts without cells.
 bool has_points_outside(const Body& body) {
-    const Box box = box_of(body.rest);
+    Box box;
+    for (const auto& at : body.cells.corners)
+        box.extend(body.cells.origin + body.cells.spacing * Vec3d(at[0], at[1], at[2]));
     const double slack = 1e-3 * body.spacing();
     return std::ranges::any_of(body.surface.points.rest, [&](const Vec3f& point) {
         const Vec3d p = point.cast<double>();
@@ -111,12 +119,13 @@ MatterContacts::Followed MatterContacts::followed(const BodyState& body) {
         followed.corners = outermost(body.body->rest);
         return followed;
     }
+    followed.has_points_outside = has_points_outside(*body.body);
+    const std::size_t count = body.corner_positions().size();
+    followed.counts.resize((count + kExtremesPadding - 1) / kExtremesPadding * kExtremesPadding, 0);
+    std::fill_n(followed.counts.begin(), count, 1.0f);
+    if (body.corners) return followed;
     const std::vector<float>& mass = body.body->mass;
     followed.heaviest = Index(std::ranges::max_element(mass) - mass.begin());
-    followed.has_points_outside = has_points_outside(*body.body);
-    followed.counts.resize((mass.size() + kExtremesPadding - 1) / kExtremesPadding * kExtremesPadding, 0);
-    std::fill_n(followed.counts.begin(), mass.size(), 1.0f);
-    if (body.has_balls()) return followed; // those are light beside the corners of cells alone
     const std::vector<std::uint8_t> light = light_particles(*body.body);
     for (std::size_t i = 0; i < light.size(); ++i) followed.counts[i] = light[i] ? 0.0f : 1.0f;
     return followed;
@@ -140,7 +149,7 @@ Box MatterContacts::extent(const BodyState& body, std::size_t number) const {
         const Vec3f half = box.half_axes.cwiseAbs().rowwise().sum();
         return {(box.centre - half).cast<double>(), (box.centre + half).cast<double>()};
     }
-    Box box = box_of(body.positions);
+    Box box = box_of(body.corner_positions());
     if (followed_[number]->has_points_outside)
         for (std::size_t s = 0; s < body.surface.size(); ++s)
             box.extend(embedded_point(body.surface, s, body.positions).cast<double>());
@@ -184,7 +193,7 @@ void MatterContacts::begin_frame(std::span<const BodyState> bodies, const RunCon
     list_work(bodies); // some may have woken or gone to sleep
     travel(bodies, 0, context);
     for (std::size_t b = 0; b < bodies.size(); ++b)
-        if (!bodies[b].is_absent) places_[b] = bodies[b].positions;
+        if (!bodies[b].is_absent) places_[b] = bodies[b].corner_positions();
     shifts_.assign(bodies.size(), {});
     find_recovering(bodies);
     for (Side& side : sides_) {
@@ -207,7 +216,7 @@ void MatterContacts::was_moved(std::size_t body, float way) {
 void MatterContacts::travel(std::span<const BodyState> bodies, float dt, const RunContext& context) {
     parallel_for(context, bodies.size(), kBodiesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t b = begin; b < end; ++b)
-            if (!bodies[b].is_absent) speeds_[b] = extremes(b, bodies[b].velocities, nullptr);
+            if (!bodies[b].is_absent) speeds_[b] = extremes(b, bodies[b].corner_velocities(), nullptr);
     });
     way_ += dt * relative_speed_of_all([&](std::size_t b) { return !bodies[b].is_absent; });
     parallel_for(context, sides_.size(), kTravelGrain, [&](std::size_t begin, std::size_t end) {
@@ -224,7 +233,8 @@ void MatterContacts::travel(std::span<const BodyState> bodies, float dt, const R
 void MatterContacts::find_shifts(std::span<const BodyState> bodies, const RunContext& context) {
     parallel_for(context, bodies.size(), kBodiesGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t b = begin; b < end; ++b)
-            if (!bodies[b].is_absent && !bodies[b].sleeps()) shifts_[b] = extremes(b, bodies[b].positions, &places_[b]);
+            if (!bodies[b].is_absent && !bodies[b].sleeps())
+                shifts_[b] = extremes(b, bodies[b].corner_positions(), &places_[b]);
     });
 }
 
@@ -232,7 +242,7 @@ void MatterContacts::find_shifts(std::span<const BodyState> bodies, const RunCon
 void MatterContacts::count_from_here(std::span<const BodyState> bodies) {
     for (Side& side : sides_) side.moved = moved(side);
     for (std::size_t b = 0; b < bodies.size(); ++b)
-        if (!bodies[b].is_absent && !bodies[b].sleeps()) places_[b] = bodies[b].positions;
+        if (!bodies[b].is_absent && !bodies[b].sleeps()) places_[b] = bodies[b].corner_positions();
     shifts_.assign(bodies.size(), {});
 }
 
@@ -346,7 +356,7 @@ public:
     void find_points(Index body, const RunContext& context) { points_[body] = surface_places(bodies_[body], context); }
     void find_cells(Index body) {
         const float reach = (kMostReach + (is_rigid(body) ? kMostMargin : 0)) * float(bodies_[body].body->spacing());
-        if (!cells_[body]) cells_[body].emplace(*contacts_.matter_[body], bodies_[body].positions, reach);
+        if (!cells_[body]) cells_[body].emplace(*contacts_.matter_[body], bodies_[body].corner_positions(), reach);
     }
 
     const Box& extent(Index body) const { return extents_[body]; }            ///< after find_extent
@@ -504,7 +514,7 @@ float MatterContacts::crushed_part(const BodyState& body, const Matter& matter) 
     const std::size_t cells = body.body->cells.cells.size();
     std::size_t crushed = 0, asked = 0;
     for (Index c = 0; c < cells; c += kAskedCells, ++asked)
-        crushed += !(matter.volume_ratio(body.positions, c) > kCrushed);
+        crushed += !(matter.volume_ratio(body.corner_positions(), c) > kCrushed);
     return float(crushed) / float(asked);
 }
 

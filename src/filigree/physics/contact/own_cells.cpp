@@ -16,15 +16,20 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kOwnCellsGrain = 16, kClusterCells = 8;
-constexpr double kTangledClusters = 512;   ///< near clusters a cluster of a body crushed or mixed
-constexpr std::size_t kTangledPoints = 16; ///< near points a point of such a body
 constexpr std::size_t kFoldsGrain = 256, kFoldedGrain = 8;
 constexpr float kAstray = 0.5f; ///< cells that a place in a deformed cell may be from where its middle's slope says
+
+/// Of bodies whose particles are the corners none: these have theirs.
+Embedding points_in_cells(const Body& body) {
+    if (body.corners.size() == 0) return {};
+    return embed_in_cells(body.surface.points.rest, body.cells, RunContext());
+}
 
 } // namespace
 
 OwnCells::OwnCells(const Matter& matter)
-    : matter_(matter), points_(matter.body().surface.points), folded_cells_(matter) {
+    : matter_(matter), in_cells_(points_in_cells(matter.body())),
+      points_(in_cells_.size() == 0 ? matter.body().surface.points : in_cells_), folded_cells_(matter) {
     const Cells& cells = matter.body().cells;
     std::map<Key, std::vector<Index>> by_key;
     for (Index c = 0; c < cells.cells.size(); ++c)
@@ -122,9 +127,7 @@ std::vector<OwnCells::Extent> OwnCells::extents(const Vectors& positions) const 
 }
 
 /// Pairs of clusters that come within `around` of each other and have cells that are far; ascending, both ways round.
-/// None where there are more than `most`.
-std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Extent> extents, float around,
-                                                             double most) const {
+std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Extent> extents, float around) const {
     struct ClusterBall { // and what else decides about two whose boxes are near, side by side in memory
         Vec3f centre;
         float radius;
@@ -156,7 +159,6 @@ std::vector<std::pair<Index, Index>> OwnCells::near_clusters(std::span<const Ext
     std::vector<Index> offsets(extents.size() + 1, 0);
     std::vector<std::uint16_t> room;
     for (std::size_t a = 0; a < balls.size(); ++a) {
-        if (double(near.size()) > most) return {};
         sweep.each_near(a, around, room, [&](std::size_t b) {
             if (!may_touch(balls[a], balls[b])) return;
             near.emplace_back(balls[a].cluster, balls[b].cluster);
@@ -314,8 +316,7 @@ OwnCells::Folds OwnCells::folds(const Vectors& positions, float reach, const Run
 }
 
 std::vector<std::pair<Index, Index>> OwnCells::near_of_find(std::span<const Extent> extents, float reach) const {
-    return near_clusters(extents, reach + 2 * overhang_, // twice: matter that is stretched
-                         std::numeric_limits<double>::infinity());
+    return near_clusters(extents, reach + 2 * overhang_); // twice: matter that is stretched
 }
 
 std::size_t OwnCells::candidates(const Vectors& positions, float reach) const {
@@ -343,29 +344,6 @@ std::vector<Index> OwnCells::find(const Vectors& positions, const Folds& folds, 
             return (CellBox(matter_.corners(held_by), positions).centre - p).squaredNorm();
         };
         if (found[s] == kNoIndex || away(cell) < away(found[s])) found[s] = cell;
-    }
-    return found;
-}
-
-std::vector<std::pair<Index, Index>> OwnCells::near_points(const Vectors& places, float far) const {
-    std::vector<std::pair<Index, Index>> found;
-    if (clusters_.size() < 2 || points_.size() == 0) return found;
-    std::vector<Extent> extents(clusters_.size() - 1);
-    for (Index k = 0; k < extents.size(); ++k) extents[k] = extent_of(points_of(k), places);
-    std::vector<Index> inside;
-    for (const auto& [cluster, other] : near_clusters(extents, far, kTangledClusters * double(extents.size()))) {
-        if (cluster > other) continue;
-        if (found.size() > kTangledPoints * points_.size()) return {};
-        const Eigen::Array3f low = extents[other].low.array() - far, high = extents[other].high.array() + far;
-        inside.clear();
-        for (const Index s : points_of(cluster))
-            if ((places[s].array() >= low).all() && (places[s].array() <= high).all()) inside.push_back(s);
-        for (const Index s : inside)
-            for (const Index t : points_of(other)) {
-                if ((cluster == other && t <= s) || (places[t] - places[s]).squaredNorm() >= far * far) continue;
-                if (!matter_.are_in_three_steps(matter_.cell_of_point(s), matter_.cell_of_point(t)))
-                    found.emplace_back(std::min(s, t), std::max(s, t));
-            }
     }
     return found;
 }

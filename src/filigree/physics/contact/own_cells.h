@@ -26,19 +26,13 @@ public:
 
     /// For each surface point the far or folded cell that holds it, or the nearest of these within reach (m); kNoIndex
     /// where there is none. Cost O(clusters and folds, and cells and points that are near far cells). positions: of the
-    /// body's particles.
+    /// cells' corners.
     std::vector<Index> find(const Vectors& positions, const Folds& folds, float reach, const RunContext& context) const;
 
     bool are_far(Index cell, Index other) const;
 
     /// How many pairs of clusters `find` looks into, which is what it costs.
     std::size_t candidates(const Vectors& positions, float reach) const;
-
-    /// Pairs of surface points, the smaller number first, that have come nearer to each other than `far` (m) and lie in
-    /// cells of which neither is reached from the other in three steps; none where the body is crushed or mixed, so
-    /// that everything is near everything. places: of all points, or of balls under them. Cost O(points), and points
-    /// squared where far clusters are near each other.
-    std::vector<std::pair<Index, Index>> near_points(const Vectors& places, float far) const;
 
 private:
     using Key = std::array<int, 3>;
@@ -67,8 +61,7 @@ private:
     std::uint64_t far_cells(Index cluster, Index other) const;
     std::vector<Extent> extents(const Vectors& positions) const;
     std::vector<std::pair<Index, Index>> near_of_find(std::span<const Extent> extents, float reach) const;
-    std::vector<std::pair<Index, Index>> near_clusters(std::span<const Extent> extents, float around,
-                                                       double most) const;
+    std::vector<std::pair<Index, Index>> near_clusters(std::span<const Extent> extents, float around) const;
     NearBoxes cell_boxes(std::span<const std::pair<Index, Index>> near, const Vectors& positions,
                          const RunContext& context) const;
     void look_into(std::span<const std::pair<Index, Index>> near, std::span<const Extent> extents,
@@ -78,7 +71,8 @@ private:
                    Folds& folds) const;
 
     const Matter& matter_;
-    const Embedding& points_;
+    const Embedding in_cells_;      ///< of a meshfree body: its surface points in corners of cells
+    const Embedding& points_;       ///< in corners of cells
     std::vector<Cluster> clusters_; ///< and one behind the last
     std::vector<Index> cells_, corners_, surface_points_;
     std::vector<Index> point_offsets_;     ///< of each of cells_, and the end

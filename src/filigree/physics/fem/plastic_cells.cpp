@@ -10,9 +10,6 @@ namespace filigree {
 
 namespace {
 
-constexpr float kCrushedCell = 0.1f; ///< volume ratio below which a cell does not yield
-constexpr float kMostFlowed = 50;    ///< |inverse|^2 beyond which it does not flow further
-
 Mat3f linear_part(const CellSums& sums) {
     Mat3f linear;
     for (int a = 0; a < 3; ++a) linear.col(a) = sums[kLinearSums[a]];
@@ -46,7 +43,7 @@ bool PlasticCell::is_sound() const {
 void yield(PlasticCell& cell, const CellSums& sums, float size, const FlowLaw& law) {
     const CellSums elastic = cell.elastic(sums);
     const Mat3f gradient = linear_part(elastic) / size;
-    if (!(gradient.determinant() > kCrushedCell)) return;
+    if (!(gradient.determinant() > kLeastYielding)) return;
     FlowLaw all = law;
     all.beside = 0;
     for (const int m : kBentSums) all.beside += 0.5f * kSumShares[m] * elastic[m].squaredNorm() / (size * size);
@@ -58,8 +55,8 @@ void yield(PlasticCell& cell, const CellSums& sums, float size, const FlowLaw& l
     after.inverse /= std::cbrt(after.inverse.determinant());
     const Mat3f back = linear_part(sums).inverse();
     for (int b = 0; b < 4; ++b) after.bent[b] += (1 - kept) * (back * elastic[kBentSums[b]]);
-    const float flowed = after.inverse.squaredNorm();
-    if (!after.is_sound() || (flowed > kMostFlowed && flowed > cell.inverse.squaredNorm())) return;
+    if (!after.is_sound()) return;
+    if (flowed(after.inverse) > kMostFlowed && flowed(after.inverse) > flowed(cell.inverse)) return;
     cell = after;
 }
 

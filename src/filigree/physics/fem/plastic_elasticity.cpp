@@ -115,21 +115,21 @@ public:
         return sum;
     }
 
-    const Vectors& reference() const override { return body_.rest; }
-
     void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext& context) const override {
         corner_gradients(body_.cells, positions, gradients, context);
     }
 
     void finish_substep(const Vectors& positions, float dt, const RunContext& context) override {
-        const Material& material = body_.material;
-        const double shear = lame_parameters(material.young_modulus, material.poisson_ratio).mu;
-        FlowLaw law{float(std::sqrt(2 / 3.) * material.yield_stress / (2 * shear)), 1, 0};
-        if (material.creep_time > 0) law.yield_rate = float(-std::expm1(-double(dt) / material.creep_time));
+        const FlowLaw law = yield_law(body_.material, dt);
         parallel_for(context, plastic_.size(), kPlasticGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t cell = begin; cell < end; ++cell)
                 yield(plastic_[cell], cell_sums(positions, body_.cells.cell_corners[cell]), size_, law);
         });
+    }
+
+    std::size_t flowed_out() const override {
+        return std::size_t(
+            std::ranges::count_if(plastic_, [](const PlasticCell& cell) { return has_flowed_out(cell.inverse); }));
     }
 
     std::span<const PlasticCell> plastic_cells() const override { return plastic_; }

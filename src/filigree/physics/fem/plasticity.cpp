@@ -9,6 +9,13 @@
 
 namespace filigree {
 
+FlowLaw yield_law(const Material& material, float dt) {
+    const double shear = lame_parameters(material.young_modulus, material.poisson_ratio).mu;
+    FlowLaw law{float(std::sqrt(2 / 3.) * material.yield_stress / (2 * shear)), 1};
+    if (material.creep_time > 0) law.yield_rate = float(-std::expm1(-double(dt) / material.creep_time));
+    return law;
+}
+
 void symmetric_eigen(const Mat3f& matrix, Vec3f& values, Mat3f& vectors) {
     constexpr int kMostSweeps = 8;       // 4 are usual
     constexpr float kConverged = 1e-14f; // squares off the diagonal over those on it
@@ -55,8 +62,7 @@ bool flow(const Mat3f& elastic, const FlowLaw& law, Mat3f& R, float* kept_part) 
     const float least = mean - deviation * 0.8165f; // of three numbers with this mean and deviation
     const float yields_at =
         law.beside > 0 ? std::sqrt(std::max(law.yield_strain * law.yield_strain - law.beside, 0.0f)) : law.yield_strain;
-    if (law.relaxation == 0 && least > 0 && deviation < 2 * least * yields_at && least > kLeastStretch * kLeastStretch)
-        return false;
+    if (least > 0 && deviation < 2 * least * yields_at && least > kLeastStretch * kLeastStretch) return false;
 
     Vec3f values;
     Mat3f V;
@@ -69,7 +75,7 @@ bool flow(const Mat3f& elastic, const FlowLaw& law, Mat3f& R, float* kept_part) 
     const float volume = log_new.sum() / 3;
     Vec3f deviator = log_new - Vec3f::Constant(volume);
     const float size = std::sqrt(deviator.squaredNorm() + law.beside);
-    float kept = 1 - law.relaxation;
+    float kept = 1;
     if (size > law.yield_strain) kept *= 1 - law.yield_rate * (1 - law.yield_strain / size);
     if (kept == 1 && log_new == log_old) return false;
     if (kept_part) *kept_part = kept;

@@ -2,15 +2,31 @@
 #pragma once
 
 #include "filigree/core/types.h"
+#include "filigree/physics/fem/cofactor.h"
+#include "filigree/physics/material.h"
+
+#include <algorithm>
 
 namespace filigree {
 
 struct FlowLaw {
     float yield_strain; ///< of |dev log s|: sqrt(2/3) yield stress / (2 mu); infinite: no yield
     float yield_rate;   ///< part of the excess that flows off: 1 - exp(-dt / creep time); 1 at once
-    float relaxation;   ///< part of all deviatoric strain that flows off, of melts: 1 - exp(-dt mu / viscosity)
     float beside = 0;   ///< squared strain that the gradient does not show, which yields along with it
 };
+/// Of a material that yields, over dt seconds.
+FlowLaw yield_law(const Material& material, float dt);
+
+/// Cells and particles below this part of their volume do not yield.
+inline constexpr float kLeastYielding = 0.1f;
+/// How far matter has flowed, by the inverse D of its plastic gradient, of determinant 1: the larger of |D|^2 and
+/// |D^-1|^2, the square of how many times it became longer or thinner, or was sheared.
+inline float flowed(const Mat3f& inverse) { return std::max(inverse.squaredNorm(), cofactor(inverse).squaredNorm()); }
+/// Beyond it nothing flows further, so that what became seven times as long is elastic from there on: neighbours and
+/// corners at rest say less and less of what is near.
+inline constexpr float kMostFlowed = 50;
+/// Whether D has all but come to that limit.
+inline bool has_flowed_out(const Mat3f& inverse) { return flowed(inverse) > 0.9f * kMostFlowed; }
 
 /// Eigenvalues (not sorted) and unit eigenvectors (columns) of a symmetric matrix by Jacobi rotations; the same bytes
 /// everywhere. Not for matrices with infinite entries.

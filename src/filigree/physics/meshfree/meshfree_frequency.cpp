@@ -15,8 +15,8 @@ constexpr std::size_t kMeshfreeFrequencyGrain = 256;
 } // namespace
 
 float squared_frequency_over_stiffness(const Body& body, const MlsNeighbours& neighbours,
-                                       std::span<const float> hourglass, const Packing& packing, LinearModuli moduli,
-                                       int iterations, const RunContext& context) {
+                                       std::span<const float> hourglass, LinearModuli moduli, int iterations,
+                                       const RunContext& context) {
     const std::size_t n = body.particle_count();
     const float shear = moduli.shear, lambda = moduli.bulk - shear * (2 / 3.f);
     std::vector<Float4> motion(n), next(n);
@@ -43,7 +43,7 @@ float squared_frequency_over_stiffness(const Body& body, const MlsNeighbours& ne
         });
         parallel_for(context, n, kMeshfreeFrequencyGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i)
-                next[i] = gather_force(neighbours, packing, motion.data(), stress.data(), i);
+                next[i] = gather_force(neighbours, motion.data(), stress.data(), i);
         });
         double power = 0, mass = 0, largest = 0;
         for (std::size_t i = 0; i < n; ++i) {

@@ -11,10 +11,10 @@ struct LinearModuli {
     float shear, bulk; ///< Pa
 };
 
-/// Largest eigenvalue of M^-1 K at the positions that `neighbours` were found at, hourglass term included, over
+/// Largest eigenvalue of M^-1 K at rest, hourglass term included, over
 /// lambda + 2 mu. By power iteration: Rayleigh quotients approach it from below. hourglass: z over the shear modulus.
 float squared_frequency_over_stiffness(const Body& body, const MlsNeighbours& neighbours,
-                                       std::span<const float> hourglass, const Packing& packing, LinearModuli moduli,
-                                       int iterations, const RunContext& context);
+                                       std::span<const float> hourglass, LinearModuli moduli, int iterations,
+                                       const RunContext& context);
 
 } // namespace filigree::meshfree

@@ -3,36 +3,7 @@
 
 #include "filigree/physics/meshfree/meshfree_stress.h"
 
-#include <cmath>
-
 namespace filigree::meshfree {
-
-/// Melted particles closer than `distance` repel each other a little. Nothing where the body does not melt.
-struct Packing {
-    std::vector<float>
-        of_particle;             ///< the product of two is their pair's stiffness, N/m; empty: the body does not melt
-    float distance = 0;          ///< m
-    float scale = 0;             ///< of_particle of a melted particle over its volume
-    float squared_frequency = 0; ///< bound on what all pairs add, 1/s^2
-
-    bool acts_on(std::size_t i) const { return !of_particle.empty() && of_particle[i] > 0; }
-
-    /// Calls visit(unit vector away from the neighbour, m of overlap, N/m) for the neighbours that particle i is too
-    /// close to.
-    template <class Visit>
-    FILIGREE_INLINE void for_overlaps(const MlsNeighbours& neighbours, const Float4* position, std::size_t i,
-                                      const Visit& visit) const {
-        for (std::size_t k = neighbours.offsets[i]; k < neighbours.offsets[i + 1]; ++k) {
-            const Index j = neighbours.neighbours[k];
-            const Float4 d = position[i] - position[j];
-            const float squared = dot3(d, d);
-            const float stiffness = of_particle[i] * of_particle[j];
-            if (!(squared < distance * distance && squared > 1e-12f * distance * distance && stiffness > 0)) continue;
-            const float length = std::sqrt(squared);
-            visit(d * (1 / length), distance - length, stiffness);
-        }
-    }
-};
 
 /// F of particle i.
 FILIGREE_INLINE Columns gather_gradient(const MlsNeighbours& neighbours, const Float4* position, std::size_t i) {
@@ -52,8 +23,8 @@ FILIGREE_INLINE Columns gather_gradient(const MlsNeighbours& neighbours, const F
 }
 
 /// The force on particle i; stress: B of each particle, with z in the last lane.
-FILIGREE_INLINE Float4 gather_force(const MlsNeighbours& neighbours, const Packing& packing, const Float4* position,
-                                    const Columns* stress, std::size_t i) {
+FILIGREE_INLINE Float4 gather_force(const MlsNeighbours& neighbours, const Float4* position, const Columns* stress,
+                                    std::size_t i) {
     const Columns here = stress[i];
     const Float4 x = position[i];
     Float4 force = {};
@@ -65,9 +36,6 @@ FILIGREE_INLINE Float4 gather_force(const MlsNeighbours& neighbours, const Packi
         force += first * pair[0] + (here.c[1] + there.c[1]) * pair[1] + (here.c[2] + there.c[2]) * pair[2] +
                  (position[j] - x) * (first[3] * pair[3]);
     }
-    if (packing.acts_on(i))
-        packing.for_overlaps(neighbours, position, i,
-                             [&](Float4 away, float overlap, float stiffness) { force += stiffness * overlap * away; });
     return force;
 }
 

@@ -55,9 +55,9 @@ FILIGREE_INLINE BlockResult stress_block(const BlockArrays& arrays, std::size_t 
         const std::size_t i = first + l;
         for (int a = 0; a < 3; ++a)
             for (int r = 0; r < 3; ++r) F.m[r][a][l] = gradients[l].c[a][r];
-        if (arrays.stored)
+        if (arrays.inverse)
             for (int a = 0; a < 3; ++a)
-                for (int r = 0; r < 3; ++r) D.m[r][a][l] = arrays.stored[i](r, a);
+                for (int r = 0; r < 3; ++r) D.m[r][a][l] = arrays.inverse[i](r, a);
         const auto& m = arrays.inverse_moment[i];
         constexpr int kPlace[3][3] = {{0, 3, 4}, {3, 1, 5}, {4, 5, 2}};
         for (int a = 0; a < 3; ++a)
@@ -68,7 +68,7 @@ FILIGREE_INLINE BlockResult stress_block(const BlockArrays& arrays, std::size_t 
         g0[l] = arrays.moduli[i].g0;
         z[l] = arrays.moduli[i].z;
     }
-    const LaneMatrix Fe = arrays.stored ? product(F, D) : F;
+    const LaneMatrix Fe = arrays.inverse ? product(F, D) : F;
     const LaneMatrix cof = cofactor(Fe);
     const StressLanes J = Fe.m[0][0] * cof.m[0][0] + Fe.m[0][1] * cof.m[0][1] + Fe.m[0][2] * cof.m[0][2];
     StressLanes I = {};
@@ -79,7 +79,7 @@ FILIGREE_INLINE BlockResult stress_block(const BlockArrays& arrays, std::size_t 
     LaneMatrix P;
     for (int r = 0; r < 3; ++r)
         for (int a = 0; a < 3; ++a) P.m[r][a] = volume * (shear * Fe.m[r][a] + pressure * cof.m[r][a]);
-    if (arrays.stored) {
+    if (arrays.inverse) {
         LaneMatrix transposed;
         for (int r = 0; r < 3; ++r)
             for (int a = 0; a < 3; ++a) transposed.m[r][a] = D.m[a][r];
@@ -101,7 +101,7 @@ FILIGREE_INLINE BlockResult stress_block(const BlockArrays& arrays, std::size_t 
     const StressLanes size = pressure > zero ? pressure : -pressure;
     StressLanes stiffness =
         greater(shear, size * square_root(stretch)) + L * largest_square(cof) + 2 * mu * inverse * inverse * stretch;
-    if (arrays.stored) stiffness *= largest_square(D);
+    if (arrays.inverse) stiffness *= largest_square(D);
     return {stiffness, J, I};
 }
 

@@ -51,7 +51,7 @@ struct BlockArrays {
     const float* volume;
     const Moduli* moduli;
     const std::array<float, 6>* inverse_moment;
-    const Mat3f* stored; // D; null: the identity
+    const Mat3f* inverse; // D; null: the identity
 };
 struct BlockResult {
     StressLanes stiffness, volume_ratio, squared; // bound of dP/dF over rank-one changes, J, |Fe|^2

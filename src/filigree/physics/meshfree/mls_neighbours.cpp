@@ -28,15 +28,6 @@ float kernel(float squared, float radius) {
     return t > 0 ? t * t * t : 0.f;
 }
 
-/// Kernel sum in a full lattice, the particle itself included.
-float full_density() {
-    float sum = 0;
-    for (int k = -1; k <= 1; ++k)
-        for (int j = -1; j <= 1; ++j)
-            for (int i = -1; i <= 1; ++i) sum += kernel(float(i * i + j * j + k * k), kSupportRadius);
-    return sum;
-}
-
 /// The particles and what each has around it, before pairs are weighted.
 struct Surroundings {
     const Vectors& positions;
@@ -95,13 +86,12 @@ Surroundings find_surroundings(const Vectors& positions, std::span<const float> 
 struct PairSums {
     Mat3f moment = Mat3f::Zero();
     Vec3f first = Vec3f::Zero(); // moment
-    float weight = 0, length = 0;
-    float density; // volumes by the kernel of full radius
+    float weight = 0;
 };
 
 /// Writes the pairs of particle i.
 PairSums weigh_pairs(std::size_t i, const Surroundings& around, float inverse_cube, MlsNeighbours& result) {
-    PairSums sums{.density = around.volume[i]};
+    PairSums sums;
     for (std::size_t k = 0; k < around.found[i].size(); ++k) {
         const Index j = around.found[i][k];
         const Vec3f d = around.positions[j] - around.positions[i];
@@ -112,8 +102,6 @@ PairSums weigh_pairs(std::size_t i, const Surroundings& around, float inverse_cu
         sums.moment += (s * d) * d.transpose();
         sums.first += s * d;
         sums.weight += s;
-        sums.length += s * std::sqrt(squared);
-        sums.density += around.volume[j] * kernel(squared, kSupportRadius * around.spacing);
     }
     return sums;
 }
@@ -143,7 +131,7 @@ MlsNeighbours find_mls_neighbours(const Vectors& positions, std::span<const floa
                                   const RunContext& context) {
     const std::size_t n = positions.size();
     const auto h = float(spacing);
-    const float inverse_cube = float(1 / (spacing * spacing * spacing)), full = full_density();
+    const float inverse_cube = float(1 / (spacing * spacing * spacing));
     const Surroundings around = find_surroundings(positions, volume, h, context);
 
     MlsNeighbours result;
@@ -154,16 +142,11 @@ MlsNeighbours find_mls_neighbours(const Vectors& positions, std::span<const floa
     result.weight_sum.resize(n);
     result.inverse_moment.resize(n);
     result.self_gradient.resize(n);
-    result.exposure.resize(n);
-    result.density.resize(n);
     result.missing.resize(n);
     parallel_for(context, n, kMlsNeighboursGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const PairSums sums = weigh_pairs(i, around, inverse_cube, result);
             result.weight_sum[i] = sums.weight;
-            result.density[i] = sums.density * inverse_cube / full;
-            result.exposure[i] =
-                sums.length > 0 ? std::clamp(sums.first.norm() / sums.length / 0.15f - 1, 0.f, 1.f) : 1.f;
             const InverseMoment moment = invert(sums, h, around.found[i].size());
             const Mat3f& inverse = moment.inverse;
             result.inverse_moment[i] = {inverse(0, 0), inverse(1, 1), inverse(2, 2),

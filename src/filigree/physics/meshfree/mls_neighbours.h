@@ -27,8 +27,6 @@ struct MlsNeighbours {
     /// is the identity. Added to F; empty where all particles have gradients.
     std::vector<Mat3f> missing;
 
-    std::vector<float> exposure;      ///< 0 inside .. 1 at a surface: how far neighbours lie on one side
-    std::vector<float> density;       ///< kernel sum of volumes, 1 in a full lattice
     std::size_t lonely_particles = 0; ///< that have missing directions
 
     std::size_t size() const { return weight_sum.size(); }

@@ -65,7 +65,6 @@ public:
     }
 
     double energy(const Vectors&, const RunContext&) const override { return 0; }
-    const Vectors& reference() const override { return body_.rest; }
     void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext&) const override {
         std::ranges::fill(gradients, rotation_of(positions).cast<float>());
     }

@@ -143,7 +143,6 @@ public:
         return sum;
     }
 
-    const Vectors& reference() const override { return body_.rest; }
     void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext& context) const override {
         corner_gradients(body_.cells, positions, gradients, context);
     }

@@ -265,7 +265,6 @@ private:
         state_.contacts.search(bodies_,
                                {.time = now_,
                                 .obstacle_reach = std::clamp(2 * way, 0.25f * spacing, 4 * spacing),
-                                .pair_reach = 0.5f * spacing,
                                 .frame = frame,
                                 .step_way = step_way},
                                context_);

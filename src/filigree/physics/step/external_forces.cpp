@@ -53,16 +53,16 @@ Mat3f region_gradient(const Embedding& region, const BodyState& body, const RunC
 } // namespace
 
 Grip make_grip(const Hand& hand, const BodyState& body, const RunContext& context) {
-    const Vectors& reference = body.reference();
-    const Vec3f point = place_in_reference(body, std::span(&hand.point, 1), context).places[0];
+    const Vectors& rest = body.body->rest;
+    const Vec3f point = hand.point;
     const float reach = float(kHandReach) * float(body.body->spacing());
     Grip grip{.hand = hand, .region = {}};
     grip.region.rest = {point};
     double mass = 0, region_mass = 0;
     std::size_t nearest = 0;
-    for (std::size_t i = 0; i < reference.size(); ++i) {
-        const float squared = (reference[i] - point).squaredNorm();
-        if (squared < (reference[nearest] - point).squaredNorm()) nearest = i;
+    for (std::size_t i = 0; i < rest.size(); ++i) {
+        const float squared = (rest[i] - point).squaredNorm();
+        if (squared < (rest[nearest] - point).squaredNorm()) nearest = i;
         const float part = 1 - squared / (reach * reach);
         if (!(part > 0)) continue;
         grip.region.particles.push_back(Index(i));
@@ -77,7 +77,7 @@ Grip make_grip(const Hand& hand, const BodyState& body, const RunContext& contex
     }
     for (float& weight : grip.region.weights) weight /= float(mass);
     grip.region.offsets = {0, Index(grip.region.particles.size())};
-    grip.offset = region_gradient(grip.region, body, context) * (point - embedded_point(grip.region, 0, reference));
+    grip.offset = region_gradient(grip.region, body, context) * (point - embedded_point(grip.region, 0, rest));
     // A pull of k gives particle i the squared frequency k w_i / m_i, at most k / (sum of weighted masses).
     const double stiffest = double(kHandShare) * double(body.rest_squared_frequency) * mass;
     grip.stiffness = float(hand.stiffness > 0 ? std::min(hand.stiffness, stiffest) : stiffest / 8);
@@ -100,13 +100,11 @@ void ExternalForces::find_wind(std::span<const BodyState> bodies, double time, d
         std::vector<Mat3f> particle_gradients(body.positions.size()), gradients(body.surface.size());
         std::vector<Vec3f> points(body.surface.size());
         body.elasticity->gradients(body.positions, particle_gradients, context);
-        move_embedded(body.surface, body.elasticity->reference(), body.positions, particle_gradients, points, gradients,
-                      context);
+        move_embedded(body.surface, body.body->rest, body.positions, particle_gradients, points, gradients, context);
         Vectors forces(body.positions.size());
         for (std::size_t s = 0; s < body.surface.size(); ++s) {
             if (body.is_hidden(s)) continue;
-            const Mat3f from_rest = body.has_flowed() ? Mat3f(gradients[s] * surface_flow(body, s)) : gradients[s];
-            const Vec3f push = push_of_wind(body, s, from_rest, wind, world_.air_density, frames_per_second);
+            const Vec3f push = push_of_wind(body, s, gradients[s], wind, world_.air_density, frames_per_second);
             if (!push.isZero(0)) add_to_particles(body.surface, s, push, forces);
         }
         wind_[b] = std::move(forces);

@@ -24,7 +24,7 @@ struct Grip {
     Vec3f target(double time) const { return hand.target.at(time).cast<float>() - offset; }
 };
 
-/// hand.point goes through place_in_reference: the particles that were there at rest are seized, wherever they are now.
+/// The particles around hand.point at rest are seized, wherever they are now.
 Grip make_grip(const Hand& hand, const BodyState& body, const RunContext& context);
 
 /// N, of wind that comes towards a surface of this area at `inwards` m/s. What weighs `mass` takes up no more than an

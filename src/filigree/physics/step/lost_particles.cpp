@@ -74,7 +74,7 @@ std::size_t hold_lost_particles(SimulationState& state, BodyState& body) {
         lost += is_lost[i];
     }
     if (lost > 0) {
-        const Vectors& rest = body.reference();
+        const Vectors& rest = body.body->rest;
         const WholeMotion motion = motion_of(body, rest, is_lost);
         for (std::size_t i = 0; i < is_lost.size(); ++i) {
             if (!is_lost[i]) continue;

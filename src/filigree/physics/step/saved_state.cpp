@@ -9,12 +9,11 @@ namespace filigree {
 
 namespace {
 
-// The name of the format, its version last. A: from which side points touch obstacles.
-constexpr std::uint64_t kMagic = 0x41455441'54534c46; // "FLSTATEA"
+// The name of the format, its version last. B: meshfree bodies touch as others do.
+constexpr std::uint64_t kMagic = 0x42455441'54534c46; // "FLSTATEB"
 static_assert(sizeof(Contacts::NearMemory) == 6 * sizeof(Index) + 2 * sizeof(Vec3f) + sizeof(Vec3d),
               "padding would be saved");
 static_assert(sizeof(FeatureContacts::Near) == 6 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
-static_assert(sizeof(Contacts::BallMemory) == 5 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(MatterContacts::SideMemory) == 6 * sizeof(Index), "padding would be saved");
 static_assert(sizeof(MatterContacts::PairMemory) == 4 * sizeof(Index) + 4 * sizeof(Vec3f), "padding would be saved");
 static_assert(sizeof(LinkState) == 2 * sizeof(float) + sizeof(Vec3f), "padding would be saved");
@@ -48,15 +47,6 @@ void write_body(ByteWriter& writer, const SavedBody& body) {
     writer.vectors(body.velocities);
     writer.array(std::span(body.elasticity));
     write_pose(writer, body.rigid);
-    writer.array(std::span(body.flow));
-    if (body.flow.empty()) return;
-    writer.array(std::span(body.surface));
-    writer.array(std::span(body.balls));
-    writer.value(std::uint64_t(body.attachments.size()));
-    for (const SavedPoints& points : body.attachments) {
-        writer.array(std::span(points.places));
-        writer.array(std::span(points.gradients));
-    }
 }
 
 SavedBody read_body(ByteReader& reader) {
@@ -67,15 +57,6 @@ SavedBody read_body(ByteReader& reader) {
     const std::vector<char> elasticity = reader.array<char>();
     body.elasticity.assign(elasticity.begin(), elasticity.end());
     body.rigid = read_pose(reader);
-    body.flow = reader.array<Mat3f>();
-    if (body.flow.empty()) return body;
-    body.surface = reader.array<Vec3f>();
-    body.balls = reader.array<Vec3f>();
-    body.attachments.resize(reader.count(2 * sizeof(std::uint64_t)));
-    for (SavedPoints& points : body.attachments) {
-        points.places = reader.array<Vec3f>();
-        points.gradients = reader.array<Mat3f>();
-    }
     return body;
 }
 
@@ -85,7 +66,6 @@ void write_contacts(ByteWriter& writer, const Contacts::Memory& contacts) {
     writer.value(contacts.near_until);
     writer.array(std::span(contacts.seen));
     writer.array(std::span(contacts.features));
-    writer.array(std::span(contacts.balls));
     writer.value(contacts.matter.way);
     writer.value(contacts.matter.until);
     writer.array(std::span(contacts.matter.sides));
@@ -100,7 +80,6 @@ Contacts::Memory read_contacts(ByteReader& reader) {
     contacts.near_until = reader.value<float>();
     contacts.seen = reader.array<std::uint8_t>();
     contacts.features = reader.array<FeatureContacts::Near>();
-    contacts.balls = reader.array<Contacts::BallMemory>();
     contacts.matter.way = reader.value<float>();
     contacts.matter.until = reader.value<float>();
     contacts.matter.sides = reader.array<MatterContacts::SideMemory>();

@@ -11,20 +11,10 @@
 
 namespace filigree {
 
-/// Places of embedded points in a body that has flowed, and their gradients from rest.
-struct SavedPoints {
-    std::vector<Vec3f> places;
-    std::vector<Mat3f> gradients;
-};
-
 struct SavedBody {
     Vectors positions, velocities;
     std::string elasticity; ///< Elasticity::state
     std::optional<RigidPose> rigid;
-    // Of bodies that have flowed; empty for others, whose points are embedded as they were at the start.
-    std::vector<Mat3f> flow; ///< BodyState::flow
-    std::vector<Vec3f> surface, balls;
-    std::vector<SavedPoints> attachments; ///< in the order of their numbers
 };
 
 struct SavedState {

@@ -43,7 +43,6 @@ struct SimulationState {
 
     double frame_seconds() const { return 1 / options.frames_per_second; }
     double time() const { return double(frame) * frame_seconds(); }
-    std::vector<Attachment*> attachments_of(std::size_t body);
     const Cracks* cracks_of(std::size_t body) const; ///< null: it does not break
 };
 
@@ -70,7 +69,7 @@ bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic
                   const RunContext& context);
 /// Moves out what contacts find too deep.
 void push_out(SimulationState& state, double now, const RunContext& context);
-/// Plastic flow and heat; neighbourhoods are renewed where that asks for it.
+/// Plastic flow.
 void finish_substep(SimulationState& state, float dt, const RunContext& context);
 /// What lets go after a substep. `forces`: anything did, and forces have to be found anew; `contacts`: and they, too.
 struct Breaks {

@@ -50,13 +50,6 @@ std::size_t scale_down(BodyState& body, float factor) {
 
 } // namespace
 
-std::vector<Attachment*> SimulationState::attachments_of(std::size_t body) {
-    std::vector<Attachment*> found;
-    for (Attachment& attachment : attachments)
-        if (attachment.body == body) found.push_back(&attachment);
-    return found;
-}
-
 void note_deformation(FrameReport& report, std::size_t body, const ElasticReport& met) {
     report.most_stretch = std::max(report.most_stretch, met.most_stretch);
     if (!(met.least_volume_ratio < report.least_volume_ratio)) return;
@@ -147,12 +140,8 @@ Breaks break_bodies(SimulationState& state, double before, double now, const Run
 }
 
 void finish_substep(SimulationState& state, float dt, const RunContext& context) {
-    for (std::size_t b = 0; b < state.bodies.size(); ++b) {
-        BodyState& body = state.bodies[b];
-        if (body.is_on_grid || body.is_absent) continue;
-        body.elasticity->finish_substep(body.positions, dt, context);
-        if (body.elasticity->wants_renewal()) renew_neighbourhoods(body, state.attachments_of(b), context);
-    }
+    for (BodyState& body : state.bodies)
+        if (!body.is_on_grid && !body.is_absent) body.elasticity->finish_substep(body.positions, dt, context);
 }
 
 } // namespace filigree
