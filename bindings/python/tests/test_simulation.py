@@ -325,7 +325,7 @@ def test_a_scene_that_went_wrong_is_told(tmp_path):
     assert said == [] and run.doubt is None
     _, said = said_by(lambda: run.step(4))
     assert said[-1] == run.doubt and "energy came from nowhere" in run.doubt
-    assert "frame 1 " in said[0] and "'cube'" in said[0]
+    assert any("frame 1 " in sentence and "'cube'" in sentence for sentence in said)
     assert said_by(lambda: run.step(2))[1] == [], "once"
 
 
