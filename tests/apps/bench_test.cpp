@@ -22,7 +22,7 @@ TEST_F(Bench, SimulateMeasuresBodies) {
         EXPECT_TRUE(std::isfinite(figures.at(name)) && figures.at(name) >= 0) << name;
         EXPECT_FALSE(figure.at("unit").get<std::string>().empty()) << name;
     }
-    for (const char* name : {"forces.plain", "forces.of_plain", "forces.of_150", "sweep.of_150", "cube.frame",
+    for (const char* name : {"forces.plain", "forces.of_plain", "forces.of_150", "cube.frame",
                              "cube.substeps", "fem.substep", "springs.substep", "meshfree.substep",
                              "growth.150.substep", "growth.150.a_particle", "fall.frame", "fall.elastic",
                              "fall.coupling", "fall.restore", "fall.rate", "fall.direct", "fall.direct_of_restored"})

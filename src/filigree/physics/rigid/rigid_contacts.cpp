@@ -17,7 +17,7 @@ constexpr double kCorrected = 0.2;       ///< part of a penetration that a subst
 constexpr double kFastestCorrection = 3; ///< m/s: ... no faster than this
 constexpr double kDeep = 0.5;            ///< spacings; deeper there is no such limit
 constexpr double kSlop = 2e-3;           ///< spacings of penetration that are left, so that what rests keeps touching
-constexpr std::size_t kFewestSweeps = 10, kMostSweeps = 400, kMostRowsSwept = 40000;
+constexpr std::size_t kFewestSweeps = 4, kMostSweeps = 400, kMostRowsSwept = 16000;
 constexpr double kStill = 1e-4; ///< of what gravity adds in a substep: a smaller change of velocity ends the sweeps
 
 /// m/s that take a part of a penetration away in dt. What came deep into an obstacle, faster than a substep can see, is
@@ -118,7 +118,7 @@ double RigidContacts::solve_row(Row& row, double friction) {
     double wanted[2];
     for (int k = 0; k < 2; ++k)
         wanted[k] = row.tangent_impulses[k] - row.tangent_masses[k] * velocity.dot(row.tangents[k]);
-    const double limit = friction * row.impulse, length = std::hypot(wanted[0], wanted[1]);
+    const double limit = friction * row.impulse, length = std::sqrt(wanted[0] * wanted[0] + wanted[1] * wanted[1]);
     Vec3d impulse = Vec3d::Zero();
     for (int k = 0; k < 2; ++k) {
         if (length > limit) wanted[k] *= limit / length;
