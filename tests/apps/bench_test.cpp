@@ -22,10 +22,10 @@ TEST_F(Bench, SimulateMeasuresBodies) {
         EXPECT_TRUE(std::isfinite(figures.at(name)) && figures.at(name) >= 0) << name;
         EXPECT_FALSE(figure.at("unit").get<std::string>().empty()) << name;
     }
-    for (const char* name : {"forces.plain", "forces.of_plain", "forces.of_150", "cube.frame",
-                             "cube.substeps", "fem.substep", "springs.substep", "meshfree.substep",
-                             "growth.150.substep", "growth.150.a_particle", "fall.frame", "fall.elastic",
-                             "fall.coupling", "fall.restore", "fall.rate", "fall.direct", "fall.direct_of_restored"})
+    for (const char* name :
+         {"forces.plain", "forces.of_plain", "forces.of_150", "cube.frame", "cube.substeps", "fem.substep",
+          "springs.substep", "meshfree.substep", "growth.150.substep", "growth.150.a_particle", "fall.frame",
+          "fall.elastic", "fall.coupling", "fall.restore", "fall.rate", "fall.direct", "fall.direct_of_restored"})
         EXPECT_GT(figures["simulate." + std::string(name)], 0) << name;
     EXPECT_LT(figures.at("simulate.cube.error"), 5e-4);
     EXPECT_LT(figures.at("simulate.fall.rms"), 2e-3);
