@@ -95,14 +95,12 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
     options.mode = value_of<StepMode>(
         mode, "mode",
         {{"auto", StepMode::automatic}, {"explicit", StepMode::explicit_steps}, {"descent", StepMode::automatic}});
-    if (mode == "descent" &&
-        PyErr_WarnEx(PyExc_DeprecationWarning, "mode='descent' is gone: 'auto' takes its place.", 1))
-        throw py::error_already_set();
     options.most_substeps = most_substeps;
     options.contacts_between_bodies = contacts_between_bodies;
     options.contacts_within_bodies = contacts_within_bodies;
     options.automatic_rigid = automatic_rigid;
     std::vector<std::string> sentences;
+    if (mode == "descent") sentences.push_back("The mode 'descent' is gone; 'auto' takes its place.");
     for (std::size_t b = 0; b < actors.size(); ++b)
         if (const std::string weight =
                 weight_warning(*actors[b].body, actors[b].placement.linear(), world.gravity, "such soft matter");

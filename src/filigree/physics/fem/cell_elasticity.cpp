@@ -1,5 +1,5 @@
 // The fem material: what cell_kernel computes, behind the interface of all materials; the energy in double.
-#include "filigree/core/parallel_for.h"
+#include "filigree/core/parallel_sum.h"
 #include "filigree/physics/body.h"
 #include "filigree/physics/fem/cell_kernel.h"
 
@@ -36,20 +36,11 @@ public:
 
     double energy(const Vectors& positions, const RunContext& context) const override {
         const Cells& cells = body_.cells;
-        constexpr std::size_t kPiece = 1024;
-        std::vector<double> sums((cells.cells.size() + kPiece - 1) / kPiece); // a piece each, added in order
-        parallel_for(context, cells.cells.size(), kPiece, [&](std::size_t begin, std::size_t end) {
-            double sum = 0;
+        return parallel_sum(context, cells.cells.size(), 1024, [&](std::size_t cell) {
             std::array<Vec3d, 8> corners;
-            for (std::size_t cell = begin; cell < end; ++cell) {
-                for (int c = 0; c < 8; ++c) corners[c] = positions[cells.cell_corners[cell][c]].cast<double>();
-                sum += cell_energy(plan_.material, corners, cells.fraction[cell]);
-            }
-            sums[begin / kPiece] = sum;
+            for (int c = 0; c < 8; ++c) corners[c] = positions[cells.cell_corners[cell][c]].cast<double>();
+            return cell_energy(plan_.material, corners, cells.fraction[cell]);
         });
-        double sum = 0;
-        for (const double piece : sums) sum += piece;
-        return sum;
     }
 
     void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext& context) const override {

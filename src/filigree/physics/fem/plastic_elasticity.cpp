@@ -4,6 +4,7 @@
 // so volume is as elastic as before, and turning a cell costs nothing. Once a substep strain beyond the yield stress
 // goes over into D and b [Simo 1992].
 #include "filigree/core/parallel_for.h"
+#include "filigree/core/parallel_sum.h"
 #include "filigree/physics/body.h"
 #include "filigree/physics/fem/cell_kernel.h"
 #include "filigree/physics/fem/plastic_cells.h"
@@ -104,15 +105,8 @@ public:
     }
 
     double energy(const Vectors& positions, const RunContext& context) const override {
-        std::vector<double> sums((plastic_.size() + kPlasticGrain - 1) / kPlasticGrain);
-        parallel_for(context, plastic_.size(), kPlasticGrain, [&](std::size_t begin, std::size_t end) {
-            double sum = 0;
-            for (std::size_t cell = begin; cell < end; ++cell) sum += energy_of(cell, positions);
-            sums[begin / kPlasticGrain] = sum;
-        });
-        double sum = 0;
-        for (const double part : sums) sum += part;
-        return sum;
+        return parallel_sum(context, plastic_.size(), kPlasticGrain,
+                            [&](std::size_t cell) { return energy_of(cell, positions); });
     }
 
     void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext& context) const override {

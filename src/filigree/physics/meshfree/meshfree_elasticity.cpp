@@ -13,6 +13,7 @@
 // which each particle sums up over its own neighbours: no scatter, and momentum to the last bit of each pair.
 // Neighbours are those at rest for ever: strain is bounded (kMostFlowed), and what flows further is mpm's.
 #include "filigree/core/parallel_for.h"
+#include "filigree/core/parallel_sum.h"
 #include "filigree/physics/body.h"
 #include "filigree/physics/body/elasticity.h"
 #include "filigree/physics/meshfree/meshfree_frequency.h"
@@ -87,15 +88,8 @@ public:
         const std::size_t n = body_.particle_count();
         std::vector<Float4> position(n);
         gather(positions, position, context);
-        std::vector<double> pieces((n + kMeshfreeElasticityGrain - 1) / kMeshfreeElasticityGrain);
-        parallel_for(context, n, kMeshfreeElasticityGrain, [&](std::size_t begin, std::size_t end) {
-            double sum = 0;
-            for (std::size_t i = begin; i < end; ++i) sum += particle_energy(position.data(), i);
-            pieces[begin / kMeshfreeElasticityGrain] = sum;
-        });
-        double sum = 0;
-        for (const double piece : pieces) sum += piece;
-        return sum;
+        return parallel_sum(context, n, kMeshfreeElasticityGrain,
+                            [&](std::size_t i) { return particle_energy(position.data(), i); });
     }
 
     void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext& context) const override {

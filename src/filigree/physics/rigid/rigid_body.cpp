@@ -60,7 +60,7 @@ public:
         std::ranges::fill(forces.y, 0.0f);
         std::ranges::fill(forces.z, 0.0f);
         ElasticReport report;
-        report.squared_frequency = 3 * kRigidSquaredFrequency; // on an obstacle and between bodies, also just before
+        report.squared_frequency = 3 * kRigidSquaredFrequency; // points of both bodies push, also just before
         return report;
     }
 

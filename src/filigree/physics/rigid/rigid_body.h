@@ -5,8 +5,8 @@
 
 namespace filigree {
 
-/// Squared frequency that contacts give a rigid body at most, 1/s^2: stiff enough that five stacked stones sink in by
-/// less than a millimetre in all, soft enough for 16 substeps a frame at 60 frames a second.
+/// Squared frequency that contacts with soft bodies and obstacles' edges give a rigid body at most, 1/s^2: 16 substeps a
+/// frame at 60 frames a second.
 inline constexpr float kRigidSquaredFrequency = 0.99e6f;
 inline constexpr float kLongestRigidStep = 1.05e-3f; ///< s, of substeps that this allows
 

@@ -14,6 +14,7 @@
 // Each particle sums up the forces of its own springs, so that every spring is computed twice and nothing is scattered.
 // Particles side by side along x share a stencil, and lanes are particles: the same sums in any vector width.
 #include "filigree/core/parallel_for.h"
+#include "filigree/core/parallel_sum.h"
 #include "filigree/physics/body/elasticity.h"
 #include "filigree/physics/springs/spring_kernel.h"
 
@@ -131,16 +132,8 @@ public:
     double energy(const Vectors& positions, const RunContext& context) const override {
         CellVolumes volumes = volumes_of_cells();
         find_pressed_cells(positions, volumes, context);
-        const std::size_t n = body_.particle_count();
-        std::vector<double> pieces((n + kSpringElasticityGrain - 1) / kSpringElasticityGrain);
-        parallel_for(context, n, kSpringElasticityGrain, [&](std::size_t begin, std::size_t end) {
-            double sum = 0;
-            for (std::size_t i = begin; i < end; ++i) sum += star_energy(positions, volumes, i);
-            pieces[begin / kSpringElasticityGrain] = sum;
-        });
-        double sum = 0;
-        for (const double piece : pieces) sum += piece;
-        return sum;
+        return parallel_sum(context, body_.particle_count(), kSpringElasticityGrain,
+                            [&](std::size_t i) { return star_energy(positions, volumes, i); });
     }
 
     void gradients(const Vectors& positions, std::span<Mat3f> gradients, const RunContext& context) const override {
