@@ -1,242 +1,282 @@
-// Finding what may touch, and what contacts remember.
-#include "filigree/physics/contact/contact.h"
-
+// What may touch: the clocks of pairs, the broad phase that finds them, and which are to be searched.
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/contact/ahead.h"
+#include "filigree/physics/contact/box_sweep.h"
+#include "filigree/physics/contact/cell_boxes.h"
+#include "filigree/physics/rigid/rigid_body.h"
 
 #include <algorithm>
-#include <cmath>
+#include <limits>
 
 namespace filigree {
 
 namespace {
 
-constexpr std::size_t kContactSearchGrain = 256;
+constexpr std::size_t kExtentsGrain = 8, kClocksGrain = 512; // bodies, pairs
+/// Of what another pair may still move until it is searched; they share what a search finds out about bodies.
+constexpr float kSearchedAlong = 0.5f;
+constexpr float kCrushed = 0.05f;        ///< volume ratio below which a cell counts as crushed
+constexpr float kTooManyCrushed = 0.05f; ///< part of a body's cells
+constexpr Index kAskedCells = 7;         ///< one of so many is asked
+
+/// Part of the body's cells that are crushed or inside out, of some.
+float crushed_part(const BodyState& body, const Matter& matter) {
+    const std::size_t cells = body.body->cells.cells.size();
+    std::size_t crushed = 0, asked = 0;
+    for (Index c = 0; c < cells; c += kAskedCells, ++asked)
+        crushed += !(matter.volume_ratio(body.corner_positions(), c) > kCrushed);
+    return float(crushed) / float(asked);
+}
 
 } // namespace
 
-Contacts::Contacts(const World& world, std::size_t bodies, std::size_t actors, bool between_bodies, bool within_bodies)
-    : world_(world), near_(bodies), deepest_near_(bodies, 0), touched_(bodies, 0),
-      matter_(world, actors, between_bodies, within_bodies), features_(world) {
-    for (const Obstacle& obstacle : world.obstacles) {
-        const auto* ground = std::get_if<HalfSpace>(&obstacle.shape);
-        const bool stands = ground && !obstacle.motion.moves();
-        const Vec3d out = stands ? Vec3d(obstacle.motion.at(0).linear() * ground->normal.normalized()) : Vec3d::Zero();
-        towards_.push_back(-out.cast<float>());
-        shapes_.emplace_back(obstacle);
+/// All of a body that may touch.
+Box Contacts::extent(const BodyState& body, std::size_t number) const {
+    if (body.rigid && matter_[number]->matter) {
+        const TurnedBox box = CellBoxes(*matter_[number]->matter, body.positions, 0).rigid_box();
+        const Vec3f half = box.half_axes.cwiseAbs().rowwise().sum();
+        return {(box.centre - half).cast<double>(), (box.centre + half).cast<double>()};
     }
-    seen_.resize(bodies * shapes_.size());
+    Box box = box_of(body.corner_positions());
+    if (motions_.has_points_outside(number))
+        for (std::size_t s = 0; s < body.surface.size(); ++s)
+            box.extend(embedded_point(body.surface, s, body.positions).cast<double>());
+    return box;
 }
 
-void Contacts::begin(std::span<const BodyState> bodies) { matter_.begin(bodies); }
+/// Of what both sides have, a bound on how far, or how fast, one has gone beside the other.
+float Contacts::bound_between(const ContactPair& pair, const Extremes& points, const Extremes& touched) const {
+    if (pair.points.is_obstacle()) return MotionBounds::furthest(touched);
+    if (!pair.touched.is_obstacle()) return Extremes::between(points, touched);
+    const Vec3f& towards = towards_[pair.touched.number()];
+    return towards.isZero(0) ? MotionBounds::furthest(points) : MotionBounds::furthest_along(points, towards);
+}
 
-void Contacts::search(std::span<BodyState> bodies, const Search& search, const RunContext& context) {
-    if (matter_.search(bodies, search.frame, context)) look_near_again();
-    forget_jumps(search.time);
-    if (near_way_ + search.step_way > near_until_ && !world_.obstacles.empty()) {
-        const float reach = std::max(search.obstacle_reach, 2 * search.step_way);
-        find_near(bodies, search.time, reach, context);
-        near_way_ = 0;
-        near_until_ = reach;
+float Contacts::speed_of(const ContactPair& pair) const {
+    const auto velocities = [&](ColliderId id) {
+        return id.is_obstacle() ? Extremes{} : motions_.velocities(id.number());
+    };
+    return bound_between(pair, velocities(pair.points), velocities(pair.touched));
+}
+
+/// m: bound on how far a pair is from where it was at the last search.
+float Contacts::displacement_of(const ContactPair& pair) const {
+    const auto shifts = [&](ColliderId id) { return id.is_obstacle() ? Extremes{} : motions_.shifts(id.number()); };
+    return pair.displacement + bound_between(pair, shifts(pair.points), shifts(pair.touched));
+}
+
+void Contacts::count_from_here(std::span<const BodyState> bodies) {
+    for (ContactPair& pair : pairs_) pair.displacement = displacement_of(pair);
+    motions_.count_from_here(bodies, false);
+}
+
+void Contacts::begin_frame(std::span<BodyState> bodies, const RunContext& context) {
+    list_work(bodies); // some may have woken or gone to sleep
+    travel(bodies, 0, 0, 0, context);
+    motions_.count_from_here(bodies, true);
+    find_recovering(bodies);
+    for (ContactPair& pair : pairs_) {
+        pair.travelled = 0;
+        std::ranges::fill(pair.clear_until, 0.0f); // by speeds that may have changed
+    }
+}
+
+void Contacts::end_frame(std::span<const BodyState> bodies, const RunContext& context) {
+    motions_.find_shifts(bodies, context);
+    count_from_here(bodies);
+}
+
+void Contacts::travel(std::span<BodyState> bodies, float dt, double from, double until, const RunContext& context) {
+    place_corners(bodies, context);
+    motions_.find_speeds(bodies, dt, context);
+    std::vector<float> ways;
+    float furthest = 0;
+    for (const Obstacle& obstacle : world_.obstacles) {
+        const bool moves = obstacle.motion.moves() && until > from;
+        ways.push_back(moves ? float(obstacle_way(obstacle.motion, bodies, from, until)) : 0);
+        furthest = std::max(furthest, ways.back());
+    }
+    travelled_ += dt * relative_speed_of_all(bodies) + furthest;
+    parallel_for(context, pairs_.size(), kClocksGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            ContactPair& pair = pairs_[k];
+            const float of_obstacle = pair.is_of_bodies() ? 0 : ways[Ahead::obstacle_of(pair)];
+            pair.speed = speed_of(pair);
+            pair.travelled += dt * pair.speed + of_obstacle;
+            pair.displacement += of_obstacle;
+            pair.since += dt;
+        }
+    });
+}
+
+/// m/s: bound on what anything has beside anything.
+float Contacts::relative_speed_of_all(std::span<const BodyState> bodies) const {
+    std::optional<Extremes> all;
+    if (!shapes_.empty()) all.emplace();
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+        if (!bodies[b].is_absent) all = all ? all->with(motions_.velocities(b)) : motions_.velocities(b);
+    return all ? Extremes::between(*all, *all) : 0;
+}
+
+void Contacts::was_moved(std::size_t body, float way) {
+    travelled_ += way;
+    const ColliderId id = ColliderId::body(body);
+    for (ContactPair& pair : pairs_)
+        if (pair.points == id || pair.touched == id) pair.travelled += way;
+}
+
+void Contacts::was_placed(std::size_t body) {
+    for (ContactPair& pair : pairs_)
+        if (pair.points == ColliderId::body(body)) pair.knows_side = false;
+}
+
+void Contacts::begin_anew() {
+    reach_ = -1;
+    travelled_ = 0;
+    for (ContactPair& pair : pairs_) {
+        pair.travelled = pair.displacement = 0;
+        pair.reach = -1;
+        pair.since = std::numeric_limits<float>::max();
+        std::ranges::fill(pair.clear_until, 0.0f);
     }
 }
 
 /// Where an obstacle has jumped, what was on its other side is not where it was: sides are found anew.
 void Contacts::forget_jumps(double time) {
     for (std::size_t o = 0; o < shapes_.size() && time_; ++o) {
-        const RigidMotion& motion = world_.obstacles[o].motion;
-        if (!shapes_[o].is_traced() || !(jumps_between(motion, *time_, time))) continue;
-        for (std::size_t b = 0; b < near_.size(); ++b) seen_[b * shapes_.size() + o] = 0;
-        near_until_ = -1;
+        if (!jumps_between(world_.obstacles[o].motion, *time_, time)) continue;
+        reach_ = -1;
+        for (ContactPair& pair : pairs_) {
+            if (pair.is_of_bodies() || Ahead::obstacle_of(pair) != o) continue;
+            pair.knows_side = false;
+            pair.reach = -1;
+        }
     }
     time_ = time;
 }
 
-/// Finds the points of one body that are near obstacles.
-class Contacts::NearFinder {
-public:
-    NearFinder(Contacts& contacts, const BodyState& body, std::size_t number, float reach, const ObstaclePoses& poses,
-               const RunContext& context)
-        : contacts_(contacts), body_(body), number_(number), reach_(reach), poses_(poses), context_(context),
-          places_(body.surface.size()), distances_(body.surface.size()), old_(contacts.near_[number]) {
-        parallel_for(context, places_.size(), kContactSearchGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t s = begin; s < end; ++s) places_[s] = embedded_point(body.surface, s, body.positions);
-        });
-        box_ = bounds(places_);
-    }
-
-    NearPoints find() {
-        for (std::size_t o = 0; o < contacts_.shapes_.size(); ++o) {
-            while (next_ < old_.points.size() && old_.points[next_].obstacle < o) ++next_;
-            if (contacts_.shapes_[o].is_traced())
-                add_traced(o);
-            else
-                add_below(o);
+void Contacts::find_pairs(std::span<const BodyState> bodies, float least_reach, const Ahead& ahead,
+                          const ObstaclePoses& poses, const RunContext& context) {
+    std::vector<Box> boxes(bodies.size()); // empty: of bodies that meet nothing
+    parallel_for(context, bodies.size(), kExtentsGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t b = begin; b < end; ++b) {
+            if (bodies[b].is_absent) continue;
+            if (is_finite(bodies[b].positions)) boxes[b] = extent(bodies[b], b); // else the frame is done again
         }
-        found_.pad();
-        return std::move(found_);
+    });
+    float spacing = 0;
+    std::vector<Index> meeting;
+    std::vector<BoxSweep::Bounds> bounds;
+    for (Index b = 0; b < bodies.size(); ++b) {
+        if (boxes[b].empty()) continue;
+        meeting.push_back(b);
+        bounds.push_back({boxes[b].min.cast<float>(), boxes[b].max.cast<float>()});
+        spacing = std::max(spacing, float(bodies[b].body->spacing()));
     }
-
-private:
-    /// The number of what was found last of a point, or none. Points are asked for in ascending order.
-    std::size_t old_of(Index obstacle, Index point) {
-        const auto& points = old_.points;
-        const auto key = [&](std::size_t k) { return std::pair(points[k].obstacle, points[k].point); };
-        while (next_ < points.size() && key(next_) < std::pair(obstacle, point)) ++next_;
-        return next_ < points.size() && key(next_) == std::pair(obstacle, point) ? next_ : points.size();
-    }
-
-    /// Of a half-space, or a field.
-    void add_below(std::size_t o) {
-        const float nearest = poses_.distance_to(o, box_.centre().cast<float>()).distance - float(box_.diagonal() / 2);
-        if (nearest > reach_) return;
-        parallel_for(context_, places_.size(), kContactSearchGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t s = begin; s < end; ++s) distances_[s] = poses_.distance_to(o, places_[s]).distance;
-        });
-        for (Index s = 0; s < places_.size(); ++s) {
-            if (!(distances_[s] < reach_) || body_.is_hidden(s)) continue;
-            Near near{.obstacle = Index(o), .point = s, .grasp = {}};
-            if (const std::size_t k = old_of(Index(o), s); k < old_.points.size()) near = old_.points[k];
-            found_.points.push_back(near);
-            found_.clear_until.push_back(near.grasp.holds ? 0 : distances_[s]); // what holds is asked
-        }
-    }
-
-    void add_traced(std::size_t o) {
-        const ObstacleShape& shape = contacts_.shapes_[o];
-        const Eigen::Isometry3d to_own = poses_.at(o).inverse();
-        const bool is_new = !std::exchange(contacts_.seen_[number_ * contacts_.shapes_.size() + o], 1);
-        std::optional<StartSides> sides;
-        if (is_new) sides.emplace(body_, shape, poses_.at(o));
-        const bool is_across = sides && !sides->all_right();
-        const bool is_known = !is_new && next_ < old_.points.size() && old_.points[next_].obstacle == o;
-        const double all = 0.5 * box_.diagonal() + double(reach_);
-        if (!is_across && !is_known && shape.clearance(to_own * box_.centre(), all) >= all) return;
-        parallel_for(context_, places_.size(), kContactSearchGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t s = begin; s < end; ++s)
-                distances_[s] = float(shape.clearance(to_own * places_[s].cast<double>(), double(reach_)));
-        });
-        for (Index s = 0; s < places_.size(); ++s) {
-            if (body_.is_hidden(s)) continue;
-            const std::size_t k = is_new ? old_.points.size() : old_of(Index(o), s);
-            const Vec3d place = to_own * places_[s].cast<double>();
-            if (k < old_.points.size())
-                keep(k, place, distances_[s]);
-            else if (is_across || distances_[s] < reach_)
-                begin(o, s, place, sides ? sides->start_of(s) : to_own * inside_of(s), distances_[s]);
-        }
-    }
-
-    /// A point that was followed before. What may have met something since it was last asked has to be asked again.
-    void keep(std::size_t k, const Vec3d& place, float distance) {
-        Near near = old_.points[k];
-        Trace trace = old_.traces[near.trace];
-        const bool may_have_met =
-            !(old_.clear_until[k] > contacts_.near_way_) || !((place - trace.place).norm() < double(distance));
-        const bool is_asked = near.depth > 0 || near.grasp.holds || may_have_met;
-        if (!is_asked && !(distance < reach_)) return;
-        if (!is_asked) trace.place = place;
-        add(near, trace, is_asked ? 0 : distance);
-    }
-
-    void begin(std::size_t o, Index s, const Vec3d& place, const Vec3d& from, float distance) {
-        Near near{.obstacle = Index(o), .point = s, .grasp = {}};
-        Trace trace{.place = place};
-        if (!((place - from).norm() < double(distance))) {
-            trace.place = from;
-            near.depth = float(contacts_.shapes_[o].follow(trace.place, place).depth);
-        }
-        if (near.depth > 0 || distance < reach_) add(near, trace, near.depth > 0 ? 0 : distance);
-    }
-
-    void add(Near near, const Trace& trace, float clear_until) {
-        near.trace = Index(found_.traces.size());
-        found_.points.push_back(near);
-        found_.traces.push_back(trace);
-        found_.clear_until.push_back(clear_until);
-    }
-
-    /// World: a place in the matter beside a surface point.
-    Vec3d inside_of(Index point) const {
-        const Embedding& surface = body_.surface;
-        Vec3d sum = Vec3d::Zero();
-        for (Index k = surface.offsets[point]; k < surface.offsets[point + 1]; ++k)
-            sum += body_.positions[surface.particles[k]].cast<double>();
-        return sum / double(surface.offsets[point + 1] - surface.offsets[point]);
-    }
-
-    Contacts& contacts_;
-    const BodyState& body_;
-    const std::size_t number_;
-    const float reach_;
-    const ObstaclePoses& poses_;
-    const RunContext& context_;
-    std::vector<Vec3f> places_;
-    std::vector<float> distances_;
-    Box box_;
-    const NearPoints& old_;
-    NearPoints found_;
-    std::size_t next_ = 0;
-};
-
-void Contacts::find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context) {
-    const ObstaclePoses poses(world_, time);
-    for (std::size_t b = 0; b < bodies.size(); ++b) {
-        const BodyState& body = bodies[b];
-        if (body.is_absent) {
-            near_[b] = {};
-            was_placed(b);
-        }
-        if (body.sleeps())
-            near_[b].clear_until.assign(near_[b].clear_until.size(), 0); // ways are counted anew
-        else
-            near_[b] = NearFinder(*this, body, b, reach, poses, context).find();
-    }
-    if (follows_points()) features_.search(bodies, shapes_, matter_, poses, reach);
-}
-
-Contacts::Memory Contacts::memory() const {
-    Memory memory{{}, near_way_, near_until_, seen_, features_.near(), matter_.memory()};
-    for (Index b = 0; b < near_.size(); ++b)
-        for (std::size_t k = 0; k < near_[b].points.size(); ++k) {
-            const Near& at = near_[b].points[k];
-            const bool touches = at.trace != kNoIndex && at.depth > 0;
-            memory.near.push_back({b, at.obstacle, at.point,
-                                   Index(at.grasp.holds) + 2 * Index(at.grasp.slides) + 4 * Index(touches),
-                                   near_[b].clear_until[k], at.anchor, at.rigid_force, 0,
-                                   at.trace == kNoIndex ? Vec3d(Vec3d::Zero()) : near_[b].traces[at.trace].place});
-        }
-    return memory;
-}
-
-bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodies) {
-    const auto is_sound = [&](const NearMemory& near) {
-        return near.body < bodies.size() && near.obstacle < world_.obstacles.size() &&
-               near.point < bodies[near.body].surface.size() && near.anchor.allFinite() &&
-               near.rigid_force.allFinite() && near.place.allFinite() && std::isfinite(near.clear_until);
+    const float wanted = std::min(relative_speed_of_all(bodies) * ahead.frame, 2 * spacing);
+    const float reach = std::max({spacing, wanted, least_reach}), around = reach + spacing;
+    travelled_ = 0;
+    reach_ = reach;
+    std::vector<std::pair<ColliderId, ColliderId>> found;
+    const auto add = [&](ColliderId points, ColliderId touched) {
+        if (touched.is_obstacle() || matter_[touched.number()]->matter) found.emplace_back(points, touched);
     };
-    if (memory.seen.size() != seen_.size()) return false;
-    if (!features_.is_sound(memory.features, bodies, shapes_, matter_)) return false;
-    if (!std::isfinite(memory.near_way) || !std::isfinite(memory.near_until)) return false;
-    if (!std::ranges::all_of(memory.near, is_sound) || !matter_.is_sound(memory.matter, bodies)) return false;
-    for (NearPoints& near : near_) near = {};
-    for (const NearMemory& near : memory.near) {
-        const contact_law::Grasp grasp{(near.flags & 1) != 0, (near.flags & 2) != 0};
-        NearPoints& of = near_[near.body];
-        const bool is_traced = shapes_[near.obstacle].is_traced();
-        const float touches = (near.flags & 4) != 0 ? std::numeric_limits<float>::min() : 0; // found with the forces
-        of.points.push_back({near.obstacle, near.point, touches, grasp, near.anchor, near.rigid_force,
-                             is_traced ? Index(of.traces.size()) : kNoIndex});
-        if (is_traced) of.traces.push_back({near.place, Vec3f::Zero()});
-        near_[near.body].clear_until.push_back(near.clear_until);
+    for (const Index b : meeting) {
+        const ColliderId body = ColliderId::body(b);
+        if (within_bodies_ && !bodies[b].rigid) add(body, body);
+        for (std::size_t o = 0; o < shapes_.size(); ++o) {
+            if (!(shapes_[o].gap(boxes[b], poses.at(o)) < double(around))) continue;
+            add(body, ColliderId::obstacle(o));
+            if (!shapes_[o].sharp_edges().empty()) add(ColliderId::obstacle(o), body);
+        }
     }
-    for (NearPoints& near : near_) near.pad();
-    near_way_ = memory.near_way;
-    near_until_ = memory.near_until;
-    seen_ = memory.seen;
-    features_.set_near(memory.features);
-    time_.reset();
-    matter_.set_memory(memory.matter, bodies);
-    return true;
+    const BoxSweep sweep(bounds);
+    std::vector<std::uint16_t> room;
+    for (std::size_t a = 0; a < meeting.size() && between_bodies_; ++a) {
+        const ColliderId body = ColliderId::body(meeting[sweep.order()[a]]);
+        sweep.each_near(a, around, room, [&](std::size_t b) {
+            const ColliderId other = ColliderId::body(meeting[sweep.order()[b]]);
+            if (other == body) return;
+            add(body, other);
+            add(other, body);
+        });
+    }
+    std::ranges::sort(found);
+    std::vector<ContactPair> pairs;
+    pairs.reserve(found.size());
+    auto old = pairs_.begin();
+    for (const auto& [points, touched] : found) {
+        while (old != pairs_.end() && std::pair(old->points, old->touched) < std::pair(points, touched)) ++old;
+        const bool is_old = old != pairs_.end() && old->points == points && old->touched == touched;
+        pairs.push_back(is_old ? std::move(*old) : make_pair(points, touched, bodies));
+        pairs.back().speed = speed_of(pairs.back());
+    }
+    pairs_ = std::move(pairs);
+}
+
+void Contacts::search(std::span<BodyState> bodies, const Search& search, const RunContext& context) {
+    forget_jumps(search.time);
+    const ObstaclePoses poses(world_, search.time);
+    const Ahead ahead(world_, bodies, search);
+    const bool follows = std::ranges::any_of(shapes_, &ObstacleShape::is_traced);
+    const float next = follows ? ahead.in_step_of_all(relative_speed_of_all(bodies)) : 0;
+    bool changed = travelled_ + next > reach_;
+    if (changed) find_pairs(bodies, 2 * next, ahead, poses, context);
+    const bool woke = wake_touched(bodies);
+    const auto is_due = [&](const ContactPair& pair, float moved, float part) {
+        if (!(moved > part * (pair.reach - ahead.in_step(pair))) || sleeps(pair, bodies)) return false;
+        return !pair.is_own() || pair.since >= ahead.frame / Ahead::kOwnSearches;
+    };
+    // What has gone no further there and back is no further away.
+    const bool may_be_due = std::ranges::any_of(
+        pairs_, [&](const ContactPair& pair) { return is_due(pair, pair.displacement + pair.travelled, 1); });
+    if (may_be_due) motions_.find_shifts(bodies, context);
+    if (may_be_due &&
+        std::ranges::any_of(pairs_, [&](const ContactPair& pair) { return is_due(pair, displacement_of(pair), 1); })) {
+        changed = true;
+        count_from_here(bodies);
+        std::vector<Index> due;
+        for (Index i = 0; i < pairs_.size(); ++i)
+            if (is_due(pairs_[i], pairs_[i].displacement, kSearchedAlong)) due.push_back(i);
+        find_candidates(due, bodies, ahead, poses, context);
+    }
+    if (changed || woke) list_work(bodies);
+}
+
+/// A body that sleeps wakes when one that is awake touches it.
+bool Contacts::wake_touched(std::span<BodyState> bodies) const {
+    bool woke = false;
+    if (std::ranges::none_of(bodies, &BodyState::sleeps)) return woke;
+    for (const ContactPair& pair : pairs_) {
+        if (!pair.is_of_bodies() || !holds(pair)) continue;
+        const Index one = pair.points.number(), other = pair.touched.number();
+        for (const auto& [sleeper, awake] : {std::pair(one, other), std::pair(other, one)}) {
+            if (bodies[sleeper].is_absent || !bodies[sleeper].sleeps() || bodies[awake].sleeps()) continue;
+            wake(bodies[sleeper]);
+            woke = true;
+        }
+    }
+    return woke;
+}
+
+void Contacts::list_work(std::span<const BodyState> bodies) {
+    work_.clear();
+    for (Index i = 0; i < pairs_.size(); ++i)
+        for (Index block = 0; block < pairs_[i].blocks() && !sleeps(pairs_[i], bodies); ++block)
+            work_.push_back({i, block});
+}
+
+/// A body that starts crushed or inside out would hold itself in that shape. It does not meet itself until all of it is
+/// out of itself.
+void Contacts::find_recovering(std::span<const BodyState> bodies) {
+    for (ContactPair& pair : pairs_) {
+        if (!pair.is_own()) continue;
+        const Index body = pair.points.number();
+        const float crushed = crushed_part(bodies[body], *matter_[body]->matter);
+        const bool is_tangled = std::ranges::any_of(pair.candidates, &Candidate::is_tangled);
+        std::uint8_t& recovers = recovers_[body];
+        recovers = crushed > kTooManyCrushed || (recovers && (is_tangled || crushed > 0));
+    }
 }
 
 } // namespace filigree

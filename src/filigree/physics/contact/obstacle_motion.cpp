@@ -101,16 +101,18 @@ Vec3f ObstaclePoses::velocity(std::size_t obstacle, const Vec3f& point) const {
     return motion.moves ? Vec3f(motion.rate.at(point.cast<double>()).cast<float>()) : Vec3f(Vec3f::Zero());
 }
 
+double obstacle_way(const RigidMotion& motion, std::span<const BodyState> bodies, double from, double until) {
+    if (!motion.moves()) return 0;
+    const double moved = way_of(motion.move, from, until), turned = way_of(motion.angle, from, until);
+    // A turn by an angle vector that changes by v turns by no more than |v|.
+    const double arm = turned > 0 ? furthest_from(motion.centre + motion.move.at(from), bodies) + moved : 0;
+    return moved + turned * arm;
+}
+
 double obstacle_way(const World& world, std::span<const BodyState> bodies, double from, double until) {
     double most = 0;
-    for (const Obstacle& obstacle : world.obstacles) {
-        const RigidMotion& motion = obstacle.motion;
-        if (!motion.moves()) continue;
-        const double moved = way_of(motion.move, from, until), turned = way_of(motion.angle, from, until);
-        // A turn by an angle vector that changes by v turns by no more than |v|.
-        const double arm = turned > 0 ? furthest_from(motion.centre + motion.move.at(from), bodies) + moved : 0;
-        most = std::max(most, moved + turned * arm);
-    }
+    for (const Obstacle& obstacle : world.obstacles)
+        most = std::max(most, obstacle_way(obstacle.motion, bodies, from, until));
     return most;
 }
 

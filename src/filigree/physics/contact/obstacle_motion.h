@@ -51,5 +51,6 @@ private:
 /// Along the keys: an obstacle that goes and returns has gone its way twice. Cost O(keys), and O(particles) where an
 /// obstacle turns.
 double obstacle_way(const World& world, std::span<const BodyState> bodies, double from, double until);
+double obstacle_way(const RigidMotion& motion, std::span<const BodyState> bodies, double from, double until);
 
 } // namespace filigree

@@ -34,13 +34,16 @@ WallTouch follow_beside(const Ball& ball, Vec3d& place, const Vec3d& target) {
 
 ObstacleShape::ObstacleShape(const Obstacle& obstacle) {
     ball_ = std::get_if<Ball>(&obstacle.shape);
+    ground_ = std::get_if<HalfSpace>(&obstacle.shape);
     if (const auto* box = std::get_if<Cuboid>(&obstacle.shape)) surface_ = std::make_shared<ObstacleSurface>(*box);
     if (const auto* mesh = std::get_if<MeshObstacle>(&obstacle.shape)) {
         surface_ = mesh->surface;
         offset_ = mesh->offset;
         is_mesh_ = true;
     }
+    if (ball_) box_ = {ball_->centre.array() - ball_->radius, ball_->centre.array() + ball_->radius};
     if (!surface_) return;
+    box_ = {surface_->box().min + offset_, surface_->box().max + offset_};
     for (const Edge& edge : surface_->sharp_edges()) sharp_edges_.push_back({edge.from + offset_, edge.to + offset_});
 }
 
@@ -55,6 +58,16 @@ WallTouch ObstacleShape::follow(Vec3d& place, const Vec3d& target) const {
 double ObstacleShape::clearance(const Vec3d& point, double reach) const {
     if (ball_) return std::min(reach, std::abs((point - ball_->centre).norm() - ball_->radius));
     return surface_->clearance(point - offset_, reach);
+}
+
+double ObstacleShape::gap(const Box& box, const Eigen::Isometry3d& motion) const {
+    if (ground_) {
+        const Vec3d normal = motion.linear() * ground_->normal.normalized();
+        return normal.dot(box.centre() - motion * ground_->point) - 0.5 * normal.cwiseAbs().dot(box.size());
+    }
+    if (box_.empty()) return 0;
+    const Vec3d centre = motion * box_.centre(), half = motion.linear().cwiseAbs() * (0.5 * box_.size());
+    return ((centre - half) - box.max).cwiseMax(box.min - (centre + half)).cwiseMax(0).norm();
 }
 
 bool ObstacleShape::is_between(const Vec3d& from, const Vec3d& to) const {

@@ -26,6 +26,8 @@ public:
     bool looked_inwards() const { return surface_ && surface_->looked_inwards(); }
     using Edge = ObstacleSurface::Edge;
     std::span<const Edge> sharp_edges() const { return sharp_edges_; }
+    /// m: the obstacle at `motion` is no nearer to a box of the world than this; below 0 where it is in a half-space.
+    double gap(const Box& box, const Eigen::Isometry3d& motion) const;
     /// The closest place that stands free, outside.
     Vec3d exit(const Vec3d& point) const;
 
@@ -34,13 +36,9 @@ private:
     const Ball* ball_ = nullptr;
     Vec3d offset_ = Vec3d::Zero();
     std::vector<Edge> sharp_edges_;
+    const HalfSpace* ground_ = nullptr;
+    Box box_; ///< empty: it has no end, or that is not known
     bool is_mesh_ = false;
-};
-
-/// A point that is followed.
-struct Trace {
-    Vec3d place = Vec3d::Zero();  ///< on the side that it came from, in the obstacle's own axes
-    Vec3f normal = Vec3f::Zero(); ///< in these axes, of the wall that it touches
 };
 
 } // namespace filigree

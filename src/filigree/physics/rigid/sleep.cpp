@@ -19,8 +19,9 @@ public:
             beside_soft_[a] |= !is_rigid(b);
             beside_soft_[b] |= !is_rigid(a);
         });
-        for (Index b = 0; b < on_obstacle_.size(); ++b)
-            if (is_rigid(b) && state.contacts.is_on_obstacle(b)) on_obstacle_[groups_.root(b)] = 1;
+        state.contacts.each_on_obstacle([&](Index b) {
+            if (is_rigid(b)) on_obstacle_[groups_.root(b)] = 1;
+        });
     }
     /// Whether an obstacle carries a body, by others or itself.
     bool carries(std::size_t b) { return on_obstacle_[groups_.root(Index(b))] != 0; }
@@ -53,12 +54,10 @@ void let_rest(SimulationState& state, double from, double until) {
     for (std::size_t b = 0; b < state.bodies.size(); ++b) {
         BodyState& body = state.bodies[b];
         if (!body.rigid || body.is_absent || body.rigid->sleeps != (is_awake[support.island(b)] != 0)) continue;
-        if (body.rigid->sleeps) {
-            state.contacts.look_near_again();
+        if (body.rigid->sleeps)
             wake(body);
-        } else {
+        else
             fall_asleep(body);
-        }
     }
 }
 

@@ -39,7 +39,6 @@ constexpr float kFreeWay = 0.05f;         ///< spacings a substep: ... as far as
 constexpr double kMostDeforming = 0.5;    ///< spacings a substep, between particles of one body
 constexpr unsigned kMostSubsteps = 20000; ///< a frame
 constexpr double kUsualSubsteps = 256;    ///< a frame: what the first forces of a frame take for the step before
-constexpr float kFaster = 1.5f;           ///< than now, anything may go in the next substep
 
 /// Where internal damping has forces computed: f(x + tau v) = f(x) - tau K v, Kelvin-Voigt to first order; of v less
 /// its rigid part.
@@ -211,8 +210,7 @@ private:
         drift(dt);
         const double before = std::exchange(now_, until);
         move_pins(state_, now_, dt);
-        if (meets_anything_)
-            state_.contacts.travel(bodies_, dt, float(obstacle_way(state_.world, bodies_, before, now_)), context_);
+        if (meets_anything_) state_.contacts.travel(bodies_, dt, before, now_, context_);
     }
 
     /// Rigid bodies take all of gravity at once and half of the kick by other forces, then impulses at what they touch,
@@ -247,27 +245,15 @@ private:
             rigid_loads_[sleeper] = {};
             woke = true;
         }
-        if (woke) state_.contacts.woke(bodies_);
+        if (woke) state_.contacts.list_work(bodies_);
     }
 
     void find_contacts() {
         if (!meets_anything_) return;
         const Stopwatch watch(report_.contact_seconds);
-        const double frame = state_.frame_seconds();
-        const float speed = state_.contacts.approach_speed(bodies_) + float(state_.world.gravity.norm() * frame);
-        const float way = speed * float(frame) + float(obstacle_way(state_.world, bodies_, now_, now_ + frame));
-        const float spacing = least_spacing(bodies_);
-        float step_way = 0;
-        if (state_.contacts.follows_points()) { // half-spaces stop also what is found below them
-            const double step = std::min(frame / kLeastSubsteps, stable_step_ > 0 ? stable_step_ : frame);
-            step_way = kFaster * (speed * float(step) + float(obstacle_way(state_.world, bodies_, now_, now_ + step)));
-        }
-        state_.contacts.search(bodies_,
-                               {.time = now_,
-                                .obstacle_reach = std::clamp(2 * way, 0.25f * spacing, 4 * spacing),
-                                .frame = frame,
-                                .step_way = step_way},
-                               context_);
+        const double frame = state_.frame_seconds(), longest = frame / kLeastSubsteps;
+        const double step = stable_step_ > 0 ? std::min(longest, stable_step_) : longest;
+        state_.contacts.search(bodies_, {.time = now_, .frame = frame, .step = step}, context_);
     }
 
     /// All forces at the present positions, and the step that is stable there.

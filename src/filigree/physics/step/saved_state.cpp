@@ -9,13 +9,11 @@ namespace filigree {
 
 namespace {
 
-// The name of the format, its version last. B: meshfree bodies touch as others do.
-constexpr std::uint64_t kMagic = 0x42455441'54534c46; // "FLSTATEB"
-static_assert(sizeof(Contacts::NearMemory) == 6 * sizeof(Index) + 2 * sizeof(Vec3f) + sizeof(Vec3d),
+// The name of the format, its version last. C: contacts are pairs of one kind.
+constexpr std::uint64_t kMagic = 0x43455441'54534c46; // "FLSTATEC"
+static_assert(sizeof(Contacts::CandidateMemory) == 4 * sizeof(Index) + 4 * sizeof(Vec3f) + sizeof(Vec3d),
               "padding would be saved");
-static_assert(sizeof(FeatureContacts::Near) == 6 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
-static_assert(sizeof(MatterContacts::SideMemory) == 6 * sizeof(Index), "padding would be saved");
-static_assert(sizeof(MatterContacts::PairMemory) == 4 * sizeof(Index) + 4 * sizeof(Vec3f), "padding would be saved");
+static_assert(sizeof(Contacts::PairMemory) == 8 * sizeof(Index), "padding would be saved");
 static_assert(sizeof(LinkState) == 2 * sizeof(float) + sizeof(Vec3f), "padding would be saved");
 
 void write_pose(ByteWriter& writer, const std::optional<RigidPose>& pose) {
@@ -61,30 +59,20 @@ SavedBody read_body(ByteReader& reader) {
 }
 
 void write_contacts(ByteWriter& writer, const Contacts::Memory& contacts) {
-    writer.array(std::span(contacts.near));
-    writer.value(contacts.near_way);
-    writer.value(contacts.near_until);
-    writer.array(std::span(contacts.seen));
-    writer.array(std::span(contacts.features));
-    writer.value(contacts.matter.way);
-    writer.value(contacts.matter.until);
-    writer.array(std::span(contacts.matter.sides));
-    writer.array(std::span(contacts.matter.pairs));
-    writer.array(std::span(contacts.matter.recovers));
+    writer.value(contacts.travelled);
+    writer.value(contacts.reach);
+    writer.array(std::span(contacts.pairs));
+    writer.array(std::span(contacts.candidates));
+    writer.array(std::span(contacts.recovers));
 }
 
 Contacts::Memory read_contacts(ByteReader& reader) {
     Contacts::Memory contacts;
-    contacts.near = reader.array<Contacts::NearMemory>();
-    contacts.near_way = reader.value<float>();
-    contacts.near_until = reader.value<float>();
-    contacts.seen = reader.array<std::uint8_t>();
-    contacts.features = reader.array<FeatureContacts::Near>();
-    contacts.matter.way = reader.value<float>();
-    contacts.matter.until = reader.value<float>();
-    contacts.matter.sides = reader.array<MatterContacts::SideMemory>();
-    contacts.matter.pairs = reader.array<MatterContacts::PairMemory>();
-    contacts.matter.recovers = reader.array<std::uint8_t>();
+    contacts.travelled = reader.value<float>();
+    contacts.reach = reader.value<float>();
+    contacts.pairs = reader.array<Contacts::PairMemory>();
+    contacts.candidates = reader.array<Contacts::CandidateMemory>();
+    contacts.recovers = reader.array<std::uint8_t>();
     return contacts;
 }
 

@@ -17,8 +17,7 @@ struct SimulationState {
     SimulationState(World the_world, std::size_t body_count, std::size_t the_actor_count,
                     const StepOptions& the_options, const MadeFor& what_for)
         : world(std::move(the_world)), options(the_options), actor_count(the_actor_count), made_for(what_for),
-          contacts(world, body_count, the_actor_count, the_options.contacts_between_bodies,
-                   the_options.contacts_within_bodies),
+          contacts(world, the_actor_count, the_options.contacts_between_bodies, the_options.contacts_within_bodies),
           external(world, body_count) {}
     SimulationState(const SimulationState&) = delete; // contacts and external refer to the world
     SimulationState& operator=(const SimulationState&) = delete;
@@ -59,7 +58,6 @@ void step_on_grid(SimulationState& state, double from, double until, FrameReport
 /// What a body's elasticity met, into the frame's report.
 void note_deformation(FrameReport& report, std::size_t body, const ElasticReport& met);
 
-float least_spacing(std::span<const BodyState> bodies);
 /// Puts pinned particles where their motion has them at `now`, with its velocity; dt: of the substep, 0 at the start.
 /// Of bodies on the grid, or of the others.
 void move_pins(SimulationState& state, double now, float dt, bool on_grid = false);

@@ -1,0 +1,281 @@
+// Contacts: forces of what touches, contact points of what does not deform, and moving out what is too deep.
+#include "filigree/physics/contact/contact.h"
+
+#include "filigree/core/bits.h"
+#include "filigree/core/parallel_for.h"
+
+#include <algorithm>
+
+namespace filigree {
+
+using namespace contact_law;
+
+namespace {
+
+constexpr std::size_t kTouchGrain = 4; // blocks
+/// How much harder parts of one body push each other than two bodies do: it took a dragon that falls on itself from
+/// 0.34 spacings deep to 0.29.
+constexpr float kWithinOneBody = 1.5f;
+constexpr float kEdgeSlack = 0.1f;  ///< spacings: so deep an edge may be in what surface points carry
+constexpr float kMostMargin = 0.5f; ///< spacings, of two rigid bodies
+constexpr float kLongestWay = 0.3f; ///< spacings a substep that one body may go towards another
+
+} // namespace
+
+Contacts::Contacts(const World& world, std::size_t actors, bool between_bodies, bool within_bodies)
+    : world_(world), laws_(world, actors), between_bodies_(between_bodies), within_bodies_(within_bodies) {
+    for (const Obstacle& obstacle : world.obstacles) {
+        const auto* ground = std::get_if<HalfSpace>(&obstacle.shape);
+        const bool stands = ground && !obstacle.motion.moves();
+        const Vec3d out = stands ? Vec3d(obstacle.motion.at(0).linear() * ground->normal.normalized()) : Vec3d::Zero();
+        towards_.push_back(-out.cast<float>());
+        shapes_.emplace_back(obstacle);
+    }
+}
+
+void Contacts::begin(std::span<const BodyState> bodies) {
+    std::map<const Body*, std::shared_ptr<const BodyMatter>> known; // pieces of one kind share theirs
+    std::map<const Matter*, std::shared_ptr<const OwnCells>> own_cells;
+    for (const BodyState& state : bodies) {
+        std::shared_ptr<const BodyMatter>& matter = known[state.body.get()];
+        if (!matter) {
+            BodyMatter made;
+            if (state.body->field) made = {std::make_shared<const Matter>(*state.body), stiffness_per_area(state)};
+            matter = std::make_shared<const BodyMatter>(std::move(made));
+        }
+        matter_.push_back(matter);
+        std::shared_ptr<const OwnCells>& own = own_cells[matter->matter.get()];
+        if (matter->matter && within_bodies_ && !state.rigid && !own)
+            own = std::make_shared<const OwnCells>(*matter->matter);
+        own_cells_.push_back(own);
+        motions_.add(state);
+    }
+    recovers_.assign(bodies.size(), 0);
+    touched_.assign(bodies.size(), 0);
+}
+
+ContactPair Contacts::make_pair(ColliderId points, ColliderId touched, std::span<const BodyState> bodies) const {
+    ContactPair pair{.points = points, .touched = touched, .law = {}, .candidates = {}, .clear_until = {}};
+    const auto spacing = [&](ColliderId id) {
+        return id.is_obstacle() ? std::numeric_limits<float>::max() : float(bodies[id.number()].body->spacing());
+    };
+    const auto is_rigid = [&](ColliderId id) { return id.is_obstacle() || bodies[id.number()].rigid; };
+    pair.spacing = std::min(spacing(points), spacing(touched));
+    pair.is_rigid = is_rigid(points) && is_rigid(touched);
+    if (pair.is_of_bodies()) {
+        pair.law = laws_.of(bodies[points.number()].actor, bodies[touched.number()].actor);
+        pair.stiffness = matter_[points.number()]->matter ? 0.5f : 1.0f; // half where the other's points push as well
+        if (pair.is_own()) pair.stiffness *= kWithinOneBody;
+        return pair;
+    }
+    const Index number = points.is_obstacle() ? points.number() : touched.number();
+    const Obstacle& obstacle = world_.obstacles[number];
+    pair.law = {obstacle.friction, obstacle.restitution};
+    pair.stiffness = float(obstacle.stiffness);
+    pair.is_traced = touched.is_obstacle() && shapes_[number].is_traced();
+    if (points.is_obstacle()) pair.slack = kEdgeSlack * pair.spacing;
+    return pair;
+}
+
+template <class Visit>
+void Contacts::with_sides(const ContactPair& pair, std::span<BodyState> bodies, const ObstaclePoses& poses,
+                          const Visit& visit) const {
+    const Index points = pair.points.number(), touched = pair.touched.number();
+    const auto matter = [&] { return MatterCollider(bodies[touched], *matter_[touched], recovers_[touched] != 0); };
+    if (pair.points.is_obstacle())
+        visit(EdgePoints(poses, points), matter());
+    else if (pair.touched.is_obstacle())
+        visit(BodyPoints(bodies[points]), ObstacleCollider(shapes_[touched], poses, touched));
+    else
+        visit(BodyPoints(bodies[points]), matter());
+}
+
+/// m outside, at which a point of a rigid pair counts as touching.
+float Contacts::margin_of(const ContactPair& pair) {
+    if (!pair.is_rigid) return 0;
+    const float margin = touching_margin(pair.spacing, pair.speed);
+    return pair.is_of_bodies() ? std::min(margin, kMostMargin * pair.spacing) : margin;
+}
+
+/// The force on a point; minus it is that on what it touches. Lets friction's anchor begin, slide and end. Of a rigid
+/// pair the normal.
+template <class Points, class Touched>
+Vec3f Contacts::touch(ContactPair& pair, std::size_t k, const Points& points, const Touched& touched, float dt) const {
+    Candidate& at = pair.candidates[k];
+    const Vec3f point = points.position(at);
+    const bool is_edge = pair.points.is_obstacle();
+    const Approach approach{margin_of(pair), is_edge ? Vec3f(dt * points.velocity(at)) : Vec3f(Vec3f::Zero()), dt};
+    const Meeting met = touched.meet(at, pair, point, approach);
+    at.depth = at.is_tangled ? 0 : met.depth;
+    if (met.normal.isZero(0)) {
+        float clear = -met.depth;
+        if (met.slowest < 1) { // neighbours move alike: the point's own speed counts, and not the pair's
+            clear = pair.safe_way(clear);
+            const float speed = (points.velocity(at) - touched.velocity(at, point)).norm();
+            if (clear > 0) clear *= pair.speed / (speed + met.slowest * pair.speed);
+        }
+        pair.clear_until[k] = pair.travelled + clear;
+        at.depth = 0;
+        at.grasp = {};
+        at.is_tangled = false;
+        at.entry_normal = at.rigid_force = Vec3f::Zero();
+        return Vec3f::Zero();
+    }
+    if (at.is_tangled) return Vec3f::Zero();
+    if (pair.is_rigid) return met.normal;
+    const Touch touch{met.normal,
+                      points.velocity(at) - touched.velocity(at, point),
+                      std::min(at.depth, kDeepest * pair.spacing), // deeper it is moved out
+                      pair.stiffness * std::min(points.stiffness(at), touched.stiffness(at, points.area(at))),
+                      float(pair.law.friction),
+                      float(pair.law.restitution),
+                      std::max(points.squared_frequency(), touched.squared_frequency()) *
+                          (pair.is_of_bodies() ? 1 : pair.stiffness)};
+    Vec3f offset = Vec3f::Zero();
+    if (at.grasp.holds) offset = along_surface(touched.from_anchor(at, point), touch.normal);
+    const bool landed = !at.grasp.holds;
+    const Vec3f force = touch_force(touch, offset, at.grasp, dt, smooth_speed(world_, dt));
+    if (landed || at.grasp.slides) touched.put_anchor(at, point, offset);
+    return force;
+}
+
+ContactPoint Contacts::contact_point(ContactPair& pair, Candidate& at, const Vec3f& normal, std::span<BodyState> bodies,
+                                     const ObstaclePoses& poses) const {
+    ContactPoint point{.separation = -at.depth,
+                       .friction = float(pair.law.friction),
+                       .restitution = float(pair.law.restitution),
+                       .force = &at.rigid_force,
+                       .holds = &at.grasp.holds};
+    const bool is_edge = pair.points.is_obstacle();
+    point.body = is_edge ? pair.touched.number() : pair.points.number();
+    point.normal = is_edge ? Vec3f(-normal) : normal;
+    with_sides(pair, bodies, poses, [&](const auto& points, const auto& touched) {
+        point.place = points.position(at);
+        if (is_edge)
+            point.other_velocity = points.velocity(at);
+        else if (pair.touched.is_obstacle())
+            point.other_velocity = touched.velocity(at, point.place);
+    });
+    if (pair.is_of_bodies()) point.other = pair.touched.number();
+    return point;
+}
+
+void Contacts::note_touch(const ContactPair& pair, float depth, ContactReport& report) {
+    ++report.contacts;
+    if (!pair.is_of_bodies()) {
+        touched_[pair.points.is_obstacle() ? pair.touched.number() : pair.points.number()] |=
+            pair.points.is_obstacle() ? kInMatter : kOnObstacle;
+        report.deepest = std::max(report.deepest, depth);
+        return;
+    }
+    const std::uint8_t touch = pair.is_own() ? kInItself : kInMatter;
+    touched_[pair.points.number()] |= touch;
+    touched_[pair.touched.number()] |= touch;
+    report.deepest_in_matter = std::max(report.deepest_in_matter, depth);
+}
+
+ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, float dt, RigidContacts& rigid,
+                                   const RunContext& context) {
+    constexpr std::size_t kBlock = ContactPair::kBlock;
+    const ObstaclePoses poses(world_, time);
+    forces_.resize(work_.size() * kBlock);
+    parallel_for(context, work_.size(), kTouchGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t w = begin; w < end; ++w) {
+            Work& work = work_[w];
+            ContactPair& pair = pairs_[work.pair];
+            const std::size_t first = work.block * kBlock, left = pair.candidates.size() - first;
+            const float* until = &pair.clear_until[first];
+            std::uint64_t asked = bits_where<kBlock>([&](std::size_t k) { return !(until[k] > pair.travelled); });
+            if (left < kBlock) asked &= (std::uint64_t{1} << left) - 1; // also where a way is not a number
+            work.touching = 0;
+            if (asked == 0) continue;
+            with_sides(pair, bodies, poses, [&](const auto& points, const auto& touched) {
+                for_each_bit(asked, [&](int bit) { points.read_ahead(pair.candidates[first + std::size_t(bit)]); });
+                for_each_bit(asked, [&](int bit) {
+                    const std::size_t k = first + std::size_t(bit);
+                    Vec3f& force = forces_[w * kBlock + std::size_t(bit)];
+                    force = touch(pair, k, points, touched, dt);
+                    const bool touches = pair.candidates[k].depth > 0 || (pair.is_rigid && !force.isZero(0));
+                    work.touching |= std::uint64_t{touches} << bit;
+                });
+            });
+        }
+    });
+    ContactReport report;
+    rigid.clear();
+    touched_.assign(touched_.size(), 0);
+    for (std::size_t w = 0; w < work_.size(); ++w) {
+        ContactPair& pair = pairs_[work_[w].pair];
+        if (work_[w].block == 0) pair.deepest = 0;
+        if (work_[w].touching == 0) continue;
+        with_sides(pair, bodies, poses, [&](const auto& points, const auto& touched) {
+            for_each_bit(work_[w].touching, [&](int bit) {
+                Candidate& at = pair.candidates[work_[w].block * kBlock + std::size_t(bit)];
+                const Vec3f& force = forces_[w * kBlock + std::size_t(bit)];
+                if (pair.is_rigid) {
+                    rigid.add(contact_point(pair, at, force, bodies, poses));
+                } else {
+                    points.push(at, force);
+                    touched.push(at, -force);
+                }
+                pair.deepest = std::max(pair.deepest, at.depth);
+                if (at.depth > 0) note_touch(pair, at.depth, report);
+            });
+        });
+    }
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+        if (bodies[b].corners && touched_[b] & (kInMatter | kInItself))
+            bodies[b].corners->give_forces(bodies[b].forces, context);
+    return report;
+}
+
+template <class Points, class Touched>
+void Contacts::push_out(Candidate& at, const ContactPair& pair, const Points& points, const Touched& touched) const {
+    const Vec3f point = points.position(at);
+    const Meeting met = touched.meet(at, pair, point, {}); // others have moved it since
+    if (met.normal.isZero(0) || at.is_tangled) return;
+    const float too_deep = met.depth - pair.most_depth();
+    const float gives = points.yielding(at) + touched.yielding(at);
+    if (!(too_deep > 0) || !(gives > 0)) return;
+    const Vec3f velocity = points.velocity(at) - touched.velocity(at, point);
+    const Vec3f way = too_deep / gives * met.normal;
+    const Vec3f push = std::max(0.0f, -velocity.dot(met.normal)) / gives * met.normal;
+    points.move(at, way, push, too_deep);
+    touched.move(at, -way, -push, too_deep);
+}
+
+void Contacts::push_out(std::span<BodyState> bodies, double time, const RunContext& context) {
+    const ObstaclePoses poses(world_, time);
+    for (ContactPair& pair : pairs_) {
+        const bool may_crush = pair.touched.is_obstacle();
+        const float deep = may_crush ? CrushedParticles::kCrushing * pair.spacing : pair.most_depth();
+        if (pair.is_rigid || !(pair.deepest > deep) || sleeps(pair, bodies)) continue;
+        Vec3f outwards = Vec3f::Zero(); // of what is deep
+        with_sides(pair, bodies, poses, [&](const auto& points, const auto& touched) {
+            for (Candidate& at : pair.candidates) {
+                if (!(at.depth > deep)) continue;
+                if (may_crush) outwards += touched.meet(at, pair, points.position(at), {}).normal;
+                if (at.depth > pair.most_depth()) push_out(at, pair, points, touched);
+            }
+        });
+        if (!outwards.isZero(0))
+            crushed_.push_out(bodies[pair.points.number()], pair, shapes_[pair.touched.number()], outwards, poses,
+                              context);
+    }
+}
+
+double Contacts::added_frequency(std::size_t body) const {
+    const std::uint8_t touched = touched_[body];
+    const double in_matter = touched & kInItself ? double(kWithinOneBody) : touched & kInMatter ? 1.0 : 0.0;
+    return double(kContactShare) * ((touched & kOnObstacle ? 1.0 : 0.0) + 2 * in_matter);
+}
+
+double Contacts::longest_step() const {
+    double longest = std::numeric_limits<double>::infinity();
+    for (const ContactPair& pair : pairs_)
+        if (pair.is_of_bodies() && !pair.is_own() && pair.speed > 0)
+            longest = std::min(longest, double(kLongestWay * pair.spacing / pair.speed));
+    return longest;
+}
+
+} // namespace filigree
