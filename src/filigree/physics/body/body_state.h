@@ -43,6 +43,7 @@ struct BodyState {
     bool may_sleep = true;            ///< Actor::may_sleep
     bool is_held = false;             ///< by pins, forces or wind: not left to itself
     std::optional<RigidPose> rigid;   ///< of a rigid body
+    float rubbed_seconds = 0; ///< at whose frames' starts it rubbed, since it touched nothing (vibration.h)
     float pushed_way = 0; ///< m that particles were moved one by one, at most; a rigid body's pose has to follow
     bool sleeps() const { return is_absent || (rigid && rigid->sleeps); }
 

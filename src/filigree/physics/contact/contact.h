@@ -89,6 +89,11 @@ public:
     bool is_on_obstacle(std::size_t body) const {
         return std::ranges::any_of(near_[body].points, [](const Near& at) { return at.grasp.holds; });
     }
+    /// Whether a body touched anything, and slid along it, as of the last add_forces.
+    bool touches(std::size_t body) const { return touched_[body] != 0; }
+    bool rubs(std::size_t body) const { return (touched_[body] & MatterContacts::kRubs) != 0; }
+    /// Whether push_out may move anything.
+    bool is_too_deep(std::span<const BodyState> bodies) const;
     /// Calls visit(body, other) for each two different bodies that friction holds together.
     template <class Visit>
     void each_holding(const Visit& visit) const {

@@ -213,7 +213,7 @@ ContactReport Contacts::add_obstacle_forces(BodyState& body, std::size_t b, cons
             else
                 add_to_particles(body.surface, points[k].point, forces[k], body.forces);
             if (!(points[k].depth > 0)) return;
-            touched_[b] |= kOnObstacle;
+            touched_[b] |= kOnObstacle | (points[k].grasp.slides ? MatterContacts::kRubs : 0);
             ++report.contacts;
             report.deepest = std::max(report.deepest, points[k].depth);
         });
@@ -250,6 +250,12 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
     report.contacts += inside.contacts;
     report.deepest_in_matter = inside.deepest_in_matter;
     return report;
+}
+
+bool Contacts::is_too_deep(std::span<const BodyState> bodies) const {
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+        if (deepest_near_[b] > kCrushing * float(bodies[b].body->spacing()) && !bodies[b].rigid) return true;
+    return features_.is_too_deep() || matter_.is_too_deep();
 }
 
 void Contacts::push_out(std::span<BodyState> bodies, double time, const RunContext& context) {

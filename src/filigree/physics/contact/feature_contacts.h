@@ -22,6 +22,7 @@ public:
                              const MatterContacts& matter, const ObstaclePoses& poses, float dt, float way,
                              std::span<std::uint8_t> touched);
     /// Of what add_forces found too deep.
+    bool is_too_deep() const { return !deep_.empty(); }
     void push_out(std::span<BodyState> bodies, const MatterContacts& matter) const;
 
     /// A point near a body. Saved as it is.

@@ -95,10 +95,11 @@ public:
     /// 0.34 spacings deep to 0.29.
     static constexpr float kWithinOneBody = 1.5f;
     static constexpr float kDeepestWithin = 0.25f; ///< as kDeepest, of parts of one body
-    static constexpr std::uint8_t kTouched = 2, kTouchedItself = 4;
+    static constexpr std::uint8_t kTouched = 2, kTouchedItself = 4, kRubs = 8;
     /// As Contacts::add_forces. touched: of each body; kTouched or kTouchedItself is set where it touches.
     ContactReport add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
                              RigidContacts& rigid, const RunContext& context);
+    bool is_too_deep() const { return is_too_deep_; }
     /// As Contacts::push_out.
     void push_out(std::span<BodyState> bodies);
 

@@ -233,8 +233,9 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
             add_to_particles(bodies[side.body].surface, pair.point, force, bodies[side.body].forces);
             matter_[side.other]->add(pair.place, -force, bodies[side.other].corner_forces());
         }
-        touched[side.body] |= touch_of(side);
-        touched[side.other] |= touch_of(side);
+        const std::uint8_t touch = touch_of(side) | (pair.grasp.slides ? kRubs : 0);
+        touched[side.body] |= touch;
+        touched[side.other] |= touch;
         ++report.contacts;
         report.deepest_in_matter = std::max(report.deepest_in_matter, depth);
         is_too_deep_ |= !side.is_rigid && depth > most_depth(side);

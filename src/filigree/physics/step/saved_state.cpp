@@ -9,8 +9,8 @@ namespace filigree {
 
 namespace {
 
-// The name of the format, its version last. B: meshfree bodies touch as others do.
-constexpr std::uint64_t kMagic = 0x42455441'54534c46; // "FLSTATEB"
+// The name of the format, its version last. C: bodies know for how long they have rubbed.
+constexpr std::uint64_t kMagic = 0x43455441'54534c46; // "FLSTATEC"
 static_assert(sizeof(Contacts::NearMemory) == 6 * sizeof(Index) + 2 * sizeof(Vec3f) + sizeof(Vec3d),
               "padding would be saved");
 static_assert(sizeof(FeatureContacts::Near) == 6 * sizeof(Index) + sizeof(Vec3f), "padding would be saved");
@@ -46,6 +46,7 @@ void write_body(ByteWriter& writer, const SavedBody& body) {
     writer.vectors(body.positions);
     writer.vectors(body.velocities);
     writer.array(std::span(body.elasticity));
+    writer.value(body.rubbed_seconds);
     write_pose(writer, body.rigid);
 }
 
@@ -56,6 +57,7 @@ SavedBody read_body(ByteReader& reader) {
     body.velocities = reader.vectors(count);
     const std::vector<char> elasticity = reader.array<char>();
     body.elasticity.assign(elasticity.begin(), elasticity.end());
+    body.rubbed_seconds = reader.value<float>();
     body.rigid = read_pose(reader);
     return body;
 }

@@ -14,6 +14,7 @@ namespace filigree {
 struct SavedBody {
     Vectors positions, velocities;
     std::string elasticity; ///< Elasticity::state
+    float rubbed_seconds = 0;
     std::optional<RigidPose> rigid;
 };
 
