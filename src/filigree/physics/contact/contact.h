@@ -92,6 +92,8 @@ public:
     /// Whether a body touched anything, and slid along it, as of the last add_forces.
     bool touches(std::size_t body) const { return touched_[body] != 0; }
     bool rubs(std::size_t body) const { return (touched_[body] & MatterContacts::kRubs) != 0; }
+    /// What pushes a stiff body, as of the last add_forces.
+    const BodyLoad& load(std::size_t body) const { return loads_[body]; }
     /// Whether push_out may move anything.
     bool is_too_deep(std::span<const BodyState> bodies) const;
     /// Calls visit(body, other) for each two different bodies that friction holds together.
@@ -140,6 +142,7 @@ private:
         Vec3f anchor = Vec3f::Zero();
         Vec3f rigid_force = Vec3f::Zero(); ///< N, on a rigid body: of the last substep
         Index trace = kNoIndex;            ///< of the body's traces; none of a half-space
+        Vec3f normal = Vec3f::Zero();      ///< where it touches
     };
     struct NearPoints { ///< of a body
         static constexpr std::size_t kBlock = 64;
@@ -155,6 +158,7 @@ private:
     ContactReport add_obstacle_forces(BodyState& body, std::size_t b, const ObstaclePoses& poses, float dt,
                                       std::vector<Vec3f>& forces, std::vector<ContactPoint>& rigid,
                                       const RunContext& context);
+    void add_load(const BodyState& body, std::size_t b, const Near& at, const Vec3f& force, const ObstaclePoses& poses);
     Vec3f probe_rigid(Near& at, float& clear_until, const DistanceField::Sample& surface, float margin) const;
     ContactPoint contact_point(Near& at, const Vec3f& normal, Index b, const BodyState& body,
                                const ObstaclePoses& poses) const;
@@ -189,6 +193,7 @@ private:
     static constexpr std::uint8_t kOnObstacle = 1, kInMatter = MatterContacts::kTouched,
                                   kInItself = MatterContacts::kTouchedItself;
     std::vector<std::uint8_t> touched_; ///< of each body
+    std::vector<BodyLoad> loads_;       ///< of each body, if it is stiff
     MatterContacts matter_;
     FeatureContacts features_;
 };

@@ -130,6 +130,7 @@ Vec3f Contacts::obstacle_force(Near& at, Trace* trace, float& clear_until, const
         return Vec3f::Zero();
     }
     at.depth = -surface.distance;
+    at.normal = surface.normal;
     const Touch touch{surface.normal,
                       embedded_point(body.surface, at.point, body.velocities) - poses.velocity(at.obstacle, place),
                       std::min(at.depth, kDeepest * float(body.body->spacing())), // deeper it is moved out
@@ -178,6 +179,13 @@ ContactPoint Contacts::contact_point(Near& at, const Vec3f& normal, Index b, con
             .holds = &at.grasp.holds};
 }
 
+void Contacts::add_load(const BodyState& body, std::size_t b, const Near& at, const Vec3f& force,
+                        const ObstaclePoses& poses) {
+    const Vec3f place = embedded_point(body.surface, at.point, body.positions);
+    loads_[b].add(double(force.dot(at.normal)), at.normal, place, poses.velocity(at.obstacle, place),
+                  world_.obstacles[at.obstacle].restitution, BodyLoad::kObstacle);
+}
+
 /// forces: room. rigid: takes a rigid body's contact points.
 ContactReport Contacts::add_obstacle_forces(BodyState& body, std::size_t b, const ObstaclePoses& poses, float dt,
                                             std::vector<Vec3f>& forces, std::vector<ContactPoint>& rigid,
@@ -213,7 +221,9 @@ ContactReport Contacts::add_obstacle_forces(BodyState& body, std::size_t b, cons
             else
                 add_to_particles(body.surface, points[k].point, forces[k], body.forces);
             if (!(points[k].depth > 0)) return;
-            touched_[b] |= kOnObstacle | (points[k].grasp.slides ? MatterContacts::kRubs : 0);
+            if (body.is_stiff) add_load(body, b, points[k], forces[k], poses);
+            touched_[b] |= kOnObstacle;
+            if (points[k].grasp.slides) touched_[b] |= MatterContacts::kRubs;
             ++report.contacts;
             report.deepest = std::max(report.deepest, points[k].depth);
         });
@@ -232,6 +242,7 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
         std::vector<Vec3f> forces;
         for (std::size_t b = begin; b < end; ++b) {
             touched_[b] = 0;
+            loads_[b] = {};
             deepest_near_[b] = 0;
             if (!bodies[b].sleeps())
                 reports[b] = add_obstacle_forces(bodies[b], b, poses, dt, forces, points[b], context);
@@ -243,10 +254,11 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
         report.contacts += of_body.contacts;
         report.deepest = std::max(report.deepest, of_body.deepest);
     }
-    const ContactReport at_edges = features_.add_forces(bodies, shapes_, matter_, poses, dt, near_way_, touched_);
+    const ContactReport at_edges =
+        features_.add_forces(bodies, shapes_, matter_, poses, dt, near_way_, touched_, loads_);
     report.contacts += at_edges.contacts;
     report.deepest = std::max(report.deepest, at_edges.deepest);
-    const ContactReport inside = matter_.add_forces(bodies, dt, touched_, rigid, context);
+    const ContactReport inside = matter_.add_forces(bodies, dt, touched_, loads_, rigid, context);
     report.contacts += inside.contacts;
     report.deepest_in_matter = inside.deepest_in_matter;
     return report;

@@ -15,7 +15,7 @@ constexpr std::size_t kContactSearchGrain = 256;
 } // namespace
 
 Contacts::Contacts(const World& world, std::size_t bodies, std::size_t actors, bool between_bodies, bool within_bodies)
-    : world_(world), near_(bodies), deepest_near_(bodies, 0), touched_(bodies, 0),
+    : world_(world), near_(bodies), deepest_near_(bodies, 0), touched_(bodies, 0), loads_(bodies),
       matter_(world, actors, between_bodies, within_bodies), features_(world) {
     for (const Obstacle& obstacle : world.obstacles) {
         const auto* ground = std::get_if<HalfSpace>(&obstacle.shape);

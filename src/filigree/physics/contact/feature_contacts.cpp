@@ -130,7 +130,7 @@ float FeatureContacts::stiffness(const BodyState& body, const Matter& matter, co
 
 ContactReport FeatureContacts::add_forces(std::span<BodyState> bodies, std::span<const ObstacleShape> shapes,
                                           const MatterContacts& matter, const ObstaclePoses& poses, float dt, float way,
-                                          std::span<std::uint8_t> touched) {
+                                          std::span<std::uint8_t> touched, std::span<BodyLoad> loads) {
     ContactReport report;
     deep_.clear();
     for (Near& near : near_) {
@@ -177,7 +177,11 @@ ContactReport FeatureContacts::add_forces(std::span<BodyState> bodies, std::span
         Vec3f offset = Vec3f::Zero();
         const Vec3f slip = along_surface(velocity, depth->normal);
         if (slip.norm() > 0) offset = slip.normalized() * touch.friction * touch.depth / kTangentialStiffness;
-        of.add(place, -touch_force(touch, offset, grasp, dt, smooth_speed(world_, dt)), body.corner_forces());
+        const Vec3f force = -touch_force(touch, offset, grasp, dt, smooth_speed(world_, dt));
+        of.add(place, force, body.corner_forces());
+        if (body.is_stiff)
+            loads[near.body].add(-double(force.dot(depth->normal)), -depth->normal, point,
+                                 poses.velocity(near.obstacle, point), obstacle.restitution, BodyLoad::kObstacle);
         touched[near.body] |= MatterContacts::kTouched;
         ++report.contacts;
         report.deepest = std::max(report.deepest, deep);

@@ -20,7 +20,7 @@ public:
     /// way: m that anything may have come nearer to obstacles since the search. touched: as Contacts::add_forces.
     ContactReport add_forces(std::span<BodyState> bodies, std::span<const ObstacleShape> shapes,
                              const MatterContacts& matter, const ObstaclePoses& poses, float dt, float way,
-                             std::span<std::uint8_t> touched);
+                             std::span<std::uint8_t> touched, std::span<BodyLoad> loads);
     /// Of what add_forces found too deep.
     bool is_too_deep() const { return !deep_.empty(); }
     void push_out(std::span<BodyState> bodies, const MatterContacts& matter) const;

@@ -96,9 +96,10 @@ public:
     static constexpr float kWithinOneBody = 1.5f;
     static constexpr float kDeepestWithin = 0.25f; ///< as kDeepest, of parts of one body
     static constexpr std::uint8_t kTouched = 2, kTouchedItself = 4, kRubs = 8;
-    /// As Contacts::add_forces. touched: of each body; kTouched or kTouchedItself is set where it touches.
+    /// As Contacts::add_forces. touched: of each body; kTouched or kTouchedItself is set where it touches, and kRubs
+    /// where it slides.
     ContactReport add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
-                             RigidContacts& rigid, const RunContext& context);
+                             std::span<BodyLoad> loads, RigidContacts& rigid, const RunContext& context);
     bool is_too_deep() const { return is_too_deep_; }
     /// As Contacts::push_out.
     void push_out(std::span<BodyState> bodies);
@@ -114,6 +115,7 @@ public:
         Vec3f entry = Vec3f::Zero();       ///< normal at rest on the side where the point came in; zero outside
         bool tangled = false;              ///< it did not come in from outside, and is left alone until it is out
         Vec3f rigid_force = Vec3f::Zero(); ///< N, of two rigid bodies: of the last substep
+        Vec3f normal = Vec3f::Zero();      ///< of the other's surface, where it touches
     };
     struct PairMemory {
         Index point, cell, anchor_cell;
@@ -197,6 +199,8 @@ private:
     float clearance(const Pair& pair, const Side& side, float distance, float slowest,
                     std::span<const BodyState> bodies) const;
     void leave(Pair& pair, const Side& side, float clearance) const;
+    void add_loads(const Side& side, const Pair& pair, const Vec3f& force, std::span<const BodyState> bodies,
+                   std::span<BodyLoad> loads) const;
     float stiffness(const Side& side, const Pair& pair, std::span<const BodyState> bodies) const;
     void anchor_at(Pair& pair, const Side& side, const BodyState& other, const Vec3f& offset) const;
     Vec3f force(Pair& pair, const Side& side, std::span<const BodyState> bodies, float dt) const;

@@ -147,6 +147,7 @@ Vec3f MatterContacts::force(Pair& pair, const Side& side, std::span<const BodySt
     if (pair.clear_until > side.way) return Vec3f::Zero();
     const std::optional<Vec3f> normal = enter(pair, side, bodies);
     if (!normal) return Vec3f::Zero();
+    pair.normal = *normal;
     const BodyState &body = bodies[side.body], &other = bodies[side.other];
     const Matter& matter = *matter_[side.other];
     const Touch touch{*normal,
@@ -209,8 +210,21 @@ void MatterContacts::anchor_at(Pair& pair, const Side& side, const BodyState& ot
         pair.anchor.local -= matter_[side.other]->inverse_derivative(other.corner_positions(), pair.place) * offset;
 }
 
+/// Of both bodies, as far as they are stiff.
+void MatterContacts::add_loads(const Side& side, const Pair& pair, const Vec3f& force,
+                               std::span<const BodyState> bodies, std::span<BodyLoad> loads) const {
+    const BodyState &body = bodies[side.body], &other = bodies[side.other];
+    if (!body.is_stiff && !other.is_stiff) return;
+    const double push = double(force.dot(pair.normal)), restitution = side.law.restitution;
+    const Vec3f place = embedded_point(body.surface, pair.point, body.positions);
+    const Vec3f velocity = embedded_point(body.surface, pair.point, body.velocities);
+    const Vec3f other_velocity = matter_[side.other]->mean(pair.place, other.corner_velocities());
+    loads[side.body].add(push, pair.normal, place, other_velocity, restitution, double(side.other));
+    loads[side.other].add(push, -pair.normal, place, velocity, restitution, double(side.body));
+}
+
 ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
-                                         RigidContacts& rigid, const RunContext& context) {
+                                         std::span<BodyLoad> loads, RigidContacts& rigid, const RunContext& context) {
     ContactReport report;
     is_too_deep_ = false;
     forces_.resize(work_.size());
@@ -230,10 +244,11 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         if (side.is_rigid) add_contact_point(pair, side, bodies, force, rigid);
         if (!(depth > 0)) continue;
         if (!side.is_rigid) {
+            if (side.body != side.other) add_loads(side, pair, force, bodies, loads);
             add_to_particles(bodies[side.body].surface, pair.point, force, bodies[side.body].forces);
             matter_[side.other]->add(pair.place, -force, bodies[side.other].corner_forces());
         }
-        const std::uint8_t touch = touch_of(side) | (pair.grasp.slides ? kRubs : 0);
+        const auto touch = std::uint8_t(touch_of(side) | (pair.grasp.slides ? kRubs : 0));
         touched[side.body] |= touch;
         touched[side.other] |= touch;
         ++report.contacts;

@@ -5,6 +5,7 @@
 #include "filigree/physics/rigid/rigid_body.h"
 #include "filigree/physics/rigid/rigid_state.h"
 #include "filigree/physics/step/simulation_state.h"
+#include "filigree/physics/step/stiff_hits.h"
 #include "filigree/physics/step/stopwatch.h"
 #include "filigree/physics/step/vibration.h"
 
@@ -182,6 +183,7 @@ public:
             find_contacts();
             find_forces(dt);
             finish(dt);
+            follow_hits(bodies_, state_.contacts, double(dt));
             const Breaks breaks = break_bodies(state_, before, now_, context_);
             if (breaks.contacts) {
                 if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
@@ -220,6 +222,7 @@ private:
         drift(dt);
         const double before = std::exchange(now_, until);
         move_pins(state_, now_, dt);
+        make_way(state_, before, now_);
         if (meets_anything_)
             state_.contacts.travel(bodies_, dt, float(obstacle_way(state_.world, bodies_, before, now_)), context_);
     }

@@ -15,6 +15,7 @@ struct SavedBody {
     Vectors positions, velocities;
     std::string elasticity; ///< Elasticity::state
     float rubbed_seconds = 0;
+    BodyHit hit;
     std::optional<RigidPose> rigid;
 };
 

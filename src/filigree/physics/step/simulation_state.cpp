@@ -13,6 +13,7 @@ SavedBody save_body(const BodyState& body) {
             .velocities = body.velocities,
             .elasticity = body.elasticity->state(),
             .rubbed_seconds = body.rubbed_seconds,
+            .hit = body.hit,
             .rigid = body.rigid};
 }
 
@@ -67,6 +68,8 @@ Status restore_state(SimulationState& state, SavedState saved) {
         body.velocities = std::move(from.velocities);
         if (!(from.rubbed_seconds >= 0)) return damaged;
         body.rubbed_seconds = from.rubbed_seconds;
+        if (from.hit.pushed.other >= double(state.bodies.size())) return damaged;
+        body.hit = from.hit;
     }
     if (!state.grid->restore_state(saved.grid)) return other;
     for (BodyState& body : state.bodies)

@@ -1,7 +1,5 @@
 #include "filigree/physics/step/vibration.h"
 
-#include "filigree/physics/rigid/rigid_state.h"
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -14,36 +12,23 @@ constexpr double kRubbingDamping = 0.1; ///< of critical, of the slowest vibrati
 constexpr double kUntilCalmed = 2;      ///< vibrations
 constexpr double kMostPaid = 0.75;      ///< of a body's vibration, in a substep
 
-/// The rigid part of a body's motion, at any place.
-struct RigidMotionOf {
-    Vec3d centre, velocity, spin;
-
-    explicit RigidMotionOf(const BodyState& body) {
-        const RigidState state = rigid_state(body);
-        centre = state.centre;
-        velocity = state.linear / state.mass;
-        spin = state.angular_velocity_of(state.angular);
-    }
-    Vec3d at(const Vec3f& place) const { return velocity + spin.cross(place.cast<double>() - centre); }
-};
-
 } // namespace
 
 double vibration_energy(const BodyState& body) {
-    const RigidMotionOf rigid(body);
+    const MotionOf rigid(rigid_state(body));
     double sum = 0;
     for (std::size_t i = 0; i < body.positions.size(); ++i)
         if (!body.fixed[i])
             sum += double(body.body->mass[i]) *
-                   (body.velocities[i].cast<double>() - rigid.at(body.positions[i])).squaredNorm();
+                   (body.velocities[i].cast<double>() - rigid.at(body.positions[i].cast<double>())).squaredNorm();
     return sum / 2;
 }
 
 void scale_vibration(BodyState& body, double factor) {
-    const RigidMotionOf rigid(body);
+    const MotionOf rigid(rigid_state(body));
     for (std::size_t i = 0; i < body.positions.size(); ++i) {
         if (body.fixed[i]) continue;
-        const Vec3d along = rigid.at(body.positions[i]);
+        const Vec3d along = rigid.at(body.positions[i].cast<double>());
         body.velocities.set(i, (along + factor * (body.velocities[i].cast<double>() - along)).cast<float>());
     }
 }

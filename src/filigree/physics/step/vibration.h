@@ -1,9 +1,18 @@
 // A body's motion beside its rigid part, and how it is damped. Private to the layer.
 #pragma once
 
-#include "filigree/physics/body/body_state.h"
+#include "filigree/physics/rigid/rigid_state.h"
 
 namespace filigree {
+
+/// A body's rigid motion, at any place.
+struct MotionOf {
+    Vec3d centre, velocity, spin; ///< m, m/s, rad/s
+
+    explicit MotionOf(const RigidState& state)
+        : centre(state.centre), velocity(state.linear / state.mass), spin(state.angular_velocity_of(state.angular)) {}
+    Vec3d at(const Vec3d& place) const { return velocity + spin.cross(place - centre); }
+};
 
 /// J: kinetic energy of all that a body moves beside its rigid motion.
 double vibration_energy(const BodyState& body);
