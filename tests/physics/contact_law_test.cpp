@@ -6,6 +6,7 @@
 #include "threads.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <numbers>
@@ -52,10 +53,11 @@ enum class Ground { plane, mesh, body };
 struct OnSlope {
     const char* material;
     Ground ground;
-    double turned, heading; ///< degrees about the normal: of the cube, and of the way down
+    double turned, heading; ///< degrees about the normal: of the body, and of the way down
+    Vec3d size = Vec3d::Constant(0.1);
 };
 
-/// A cube of 0.1 m on flat ground, and gravity that leans.
+/// A box on flat ground, and gravity that leans.
 Simulation on_slope(const OnSlope& row, double degrees, double damping) {
     const double angle = degrees * std::numbers::pi / 180, heading = row.heading * std::numbers::pi / 180;
     World world;
@@ -65,7 +67,8 @@ Simulation on_slope(const OnSlope& row, double degrees, double damping) {
         9.81 * Vec3d(std::sin(angle) * std::cos(heading), -std::cos(angle), std::sin(angle) * std::sin(heading));
     Material material = preset(row.material);
     material.damping = damping;
-    std::vector<Actor> actors = {actor(cube(0.1, material), {0, 0.05, 0})};
+    std::vector<Actor> actors = {
+        actor(body_of(make_box(Vec3d::Zero(), row.size), material, 200), {0, row.size.y() / 2, 0})};
     actors[0].placement.linear() =
         Eigen::AngleAxisd(row.turned * std::numbers::pi / 180, Vec3d::UnitY()).toRotationMatrix();
     if (row.ground == Ground::body) {
@@ -109,18 +112,22 @@ TEST_P(Friction, SlidesAboveItsAngleByCoulombsLaw) {
     EXPECT_LT(along.normalized().cross(way).norm(), 0.02 * way.norm()) << "it does not turn aside";
 }
 
+std::string row_name(const testing::TestParamInfo<OnSlope>& info) {
+    std::string name = info.param.material;
+    std::erase(name, '-');
+    const std::array grounds = {"Plane", "Mesh", "Body"};
+    return name + grounds[std::size_t(info.param.ground)] + std::to_string(int(info.param.turned)) +
+           (info.param.size.y() < 0.1 ? "Flat" : "");
+}
+
 INSTANTIATE_TEST_SUITE_P(ContactLaw, Friction,
                          testing::Values(OnSlope{"rubber", Ground::plane, 0, 0}, OnSlope{"rubber", Ground::mesh, 30, 0},
                                          OnSlope{"rubber", Ground::body, 0, 0},
+                                         OnSlope{"rubber", Ground::plane, 0, 0, {0.2, 0.06, 0.2}},
                                          OnSlope{"soft-rubber", Ground::plane, 45, 70},
                                          OnSlope{"foam", Ground::plane, 0, 20},
                                          OnSlope{"lattice", Ground::plane, 15, 0}),
-                         [](const auto& info) {
-                             std::string name = info.param.material;
-                             std::erase(name, '-');
-                             return name + std::array{"Plane", "Mesh", "Body"}[std::size_t(info.param.ground)] +
-                                    std::to_string(int(info.param.turned));
-                         });
+                         row_name);
 
 // A stiff body that is stepped as elastic leaves as fast as restitution says; its own vibration has no say.
 

@@ -153,8 +153,8 @@ class ExplicitSteps {
 public:
     ExplicitSteps(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context)
         : state_(state), bodies_(state.bodies), report_(report), context_(context), now_(from), until_(until),
-          meets_anything_(!state.world.obstacles.empty() || state.options.contacts_within_bodies ||
-                          (state.options.contacts_between_bodies && state.bodies.size() > 1)) {}
+          calmed_(from), meets_anything_(!state.world.obstacles.empty() || state.options.contacts_within_bodies ||
+                                         (state.options.contacts_between_bodies && state.bodies.size() > 1)) {}
 
     double run() {
         if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
@@ -169,10 +169,6 @@ public:
             vibrations_.clear();
             find_forces(first_dt);
         }
-        if (now_ == state_.time())
-            each_elastic([&](BodyState& body, std::size_t b) {
-                calm_rubbing(body, state_.contacts.touches(b), state_.contacts.rubs(b), state_.frame_seconds());
-            });
         const auto is_left = [&] { return until_ - now_ > 1e-9 * state_.frame_seconds(); };
         while (is_left()) {
             const double steps = steps_left();
@@ -184,6 +180,7 @@ public:
             find_forces(dt);
             finish(dt);
             follow_hits(bodies_, state_.contacts, double(dt));
+            calm(!is_left());
             const Breaks breaks = break_bodies(state_, before, now_, context_);
             if (breaks.contacts) {
                 if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
@@ -416,6 +413,17 @@ private:
         });
     }
 
+    /// Every few substeps: more often would cost more, and change nothing.
+    void calm(bool is_last) {
+        constexpr unsigned kEvery = 8;
+        if (!is_last && report_.substeps % kEvery != 0) return;
+        const double seconds = now_ - calmed_;
+        calmed_ = now_;
+        each_elastic([&](BodyState& body, std::size_t b) {
+            calm_rubbing(body, state_.contacts.touches(b), state_.contacts.rubs(b), seconds);
+        });
+    }
+
     /// But for pieces of what breaks, whose copies have to move alike.
     template <class Visit>
     void each_elastic(const Visit& visit) {
@@ -466,6 +474,7 @@ private:
     FrameReport& report_;
     const RunContext& context_;
     double now_, until_;        // s
+    double calmed_;             ///< s: until when what rubs has been calmed
     const bool meets_anything_; // obstacles, other bodies or parts of the same
     std::vector<ElasticReport> elastic_;
     struct Vibration {           ///< of a body

@@ -8,9 +8,13 @@ namespace filigree {
 
 namespace {
 
-constexpr double kRubbingDamping = 0.1; ///< of critical, of the slowest vibration
+constexpr double kRubbingDamping = 0.1; ///< of critical, of vibrations across the thickness
 constexpr double kUntilCalmed = 2;      ///< vibrations
 constexpr double kMostPaid = 0.75;      ///< of a body's vibration, in a substep
+
+double shear_wave_speed(const Material& material) {
+    return std::sqrt(material.young_modulus / (2 * (1 + material.poisson_ratio) * material.density));
+}
 
 } // namespace
 
@@ -34,22 +38,21 @@ void scale_vibration(BodyState& body, double factor) {
 }
 
 double lowest_frequency(const Body& body) {
-    const Material& material = body.material;
-    const double shear = material.young_modulus / (2 * (1 + material.poisson_ratio));
-    return std::numbers::pi * std::sqrt(shear / material.density) / box_of(body.rest).size().maxCoeff();
+    return std::numbers::pi * shear_wave_speed(body.material) / box_of(body.rest).size().maxCoeff();
 }
 
-void calm_rubbing(BodyState& body, bool touches, bool rubs, double frame_seconds) {
-    if (!touches) {
-        body.rubbed_seconds = 0;
-        return;
-    }
-    if (!rubs) return;
-    const double frequency = lowest_frequency(*body.body);
-    if (double(body.rubbed_seconds) * frequency > kUntilCalmed * 2 * std::numbers::pi)
-        scale_vibration(body, std::exp(-2 * kRubbingDamping * frequency * frame_seconds));
-    else
-        body.rubbed_seconds += float(frame_seconds);
+double thickness_frequency(const Body& body) {
+    return std::numbers::pi * shear_wave_speed(body.material) / box_of(body.rest).size().minCoeff();
+}
+
+void calm_rubbing(BodyState& body, bool touches, bool rubs, double seconds) {
+    const auto step = float(seconds);
+    if (!touches) body.rubbed_seconds = std::max(0.0f, body.rubbed_seconds - step); // it may only hop
+    if (!touches || !rubs) return;
+    const double until_calmed = kUntilCalmed * 2 * std::numbers::pi / lowest_frequency(*body.body);
+    body.rubbed_seconds = std::min(body.rubbed_seconds + step, float(2 * until_calmed));
+    if (double(body.rubbed_seconds) < until_calmed) return;
+    scale_vibration(body, std::exp(-2 * kRubbingDamping * thickness_frequency(*body.body) * seconds));
 }
 
 void EnergyDebt::begin(const BodyState& body, const Vectors& forces, const RunContext& context) {

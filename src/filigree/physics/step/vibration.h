@@ -20,11 +20,13 @@ double vibration_energy(const BodyState& body);
 void scale_vibration(BodyState& body, double factor);
 /// 1/s, about that of a body's slowest vibration: a shear wave goes there and back along its longest side.
 double lowest_frequency(const Body& body);
+/// The same along its shortest side.
+double thickness_frequency(const Body& body);
 
-/// At a frame's start. A body that rubs along something trembles by itself: friction grows with the load, and feeds
-/// vibrations in which both swing in time. Then the body slides where it should stick, and too fast. What has rubbed
-/// for two of its own vibrations is damped, as rubber is by itself; a hit is over before.
-void calm_rubbing(BodyState& body, bool touches, bool rubs, double frame_seconds);
+/// After `seconds` of a frame. A body that rubs along something trembles by itself: friction grows with the load, and
+/// feeds vibrations in which both swing in time. Then the body slides where it should stick, and too fast. What has
+/// rubbed for two of its own vibrations is damped, as rubber is by itself; a hit is over before.
+void calm_rubbing(BodyState& body, bool touches, bool rubs, double seconds);
 
 /// Energy that a body has got from nowhere: where cells are crushed, elastic forces change faster than steps follow,
 /// and what is pushed out of matter is pressed together. It is taken from the body's vibration again.
