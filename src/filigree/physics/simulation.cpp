@@ -7,6 +7,7 @@
 #include "filigree/physics/step/inverted_cells.h"
 #include "filigree/physics/step/lost_particles.h"
 #include "filigree/physics/step/simulation_state.h"
+#include "filigree/physics/step/stiff_hits.h"
 
 #include <algorithm>
 #include <cassert>
@@ -64,6 +65,7 @@ BodyState begin_body(const Actor& actor, std::size_t number, const RunContext& c
     state.surface = body.surface.points;
     if (body.corners.size() != 0) state.corners.emplace(body.corners, count);
     if (!state.rigid) set_surface_stiffness(state);
+    state.is_stiff = is_stiff(body.material) && !actor.fracture;
     return state;
 }
 

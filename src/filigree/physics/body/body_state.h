@@ -1,6 +1,7 @@
 // A body on its way: what the stepper and contacts change. Private to the layer.
 #pragma once
 
+#include "filigree/physics/body/body_hit.h"
 #include "filigree/physics/body/contact_corners.h"
 #include "filigree/physics/body/elasticity.h"
 #include "filigree/physics/broken_body.h"
@@ -43,6 +44,9 @@ struct BodyState {
     bool may_sleep = true;            ///< Actor::may_sleep
     bool is_held = false;             ///< by pins, forces or wind: not left to itself
     std::optional<RigidPose> rigid;   ///< of a rigid body
+    bool is_stiff = false; ///< its bounces are over before they are seen, and are what restitution says (stiff_hits.h)
+    BodyHit hit;           ///< of a stiff body
+    float rubbed_seconds = 0; ///< at whose frames' starts it rubbed, since it touched nothing (vibration.h)
     float pushed_way = 0; ///< m that particles were moved one by one, at most; a rigid body's pose has to follow
     bool sleeps() const { return is_absent || (rigid && rigid->sleeps); }
 

@@ -52,6 +52,7 @@ void Contacts::begin(std::span<const BodyState> bodies) {
     }
     recovers_.assign(bodies.size(), 0);
     touched_.assign(bodies.size(), 0);
+    loads_.assign(bodies.size(), {});
 }
 
 ContactPair Contacts::make_pair(ColliderId points, ColliderId touched, std::span<const BodyState> bodies) const {
@@ -122,6 +123,7 @@ Vec3f Contacts::touch(ContactPair& pair, std::size_t k, const Points& points, co
         return Vec3f::Zero();
     }
     if (at.is_tangled) return Vec3f::Zero();
+    at.normal = met.normal;
     if (pair.is_rigid) return met.normal;
     const Touch touch{met.normal,
                       points.velocity(at) - touched.velocity(at, point),
@@ -160,18 +162,37 @@ ContactPoint Contacts::contact_point(ContactPair& pair, Candidate& at, const Vec
     return point;
 }
 
-void Contacts::note_touch(const ContactPair& pair, float depth, ContactReport& report) {
+void Contacts::note_touch(const ContactPair& pair, const Candidate& at, ContactReport& report) {
+    const std::uint8_t rubs = at.grasp.slides ? kRubs : 0;
     ++report.contacts;
-    if (!pair.is_of_bodies()) {
-        touched_[pair.points.is_obstacle() ? pair.touched.number() : pair.points.number()] |=
-            pair.points.is_obstacle() ? kInMatter : kOnObstacle;
-        report.deepest = std::max(report.deepest, depth);
+    if (pair.is_of_bodies()) {
+        const auto touch = std::uint8_t((pair.is_own() ? kInItself : kInMatter) | rubs);
+        touched_[pair.points.number()] |= touch;
+        touched_[pair.touched.number()] |= touch;
+        report.deepest_in_matter = std::max(report.deepest_in_matter, at.depth);
         return;
     }
-    const std::uint8_t touch = pair.is_own() ? kInItself : kInMatter;
-    touched_[pair.points.number()] |= touch;
-    touched_[pair.touched.number()] |= touch;
-    report.deepest_in_matter = std::max(report.deepest_in_matter, depth);
+    const bool is_edge = pair.points.is_obstacle();
+    const Index body = is_edge ? pair.touched.number() : pair.points.number();
+    touched_[body] |= std::uint8_t((is_edge ? kInMatter : kOnObstacle) | rubs);
+    report.deepest = std::max(report.deepest, at.depth);
+}
+
+/// On both bodies, as far as they are stiff.
+template <class Points, class Touched>
+void Contacts::add_loads(const ContactPair& pair, const Candidate& at, const Vec3f& force, const Points& points,
+                         const Touched& touched, std::span<const BodyState> bodies) {
+    const auto is_stiff = [&](ColliderId id) { return !id.is_obstacle() && bodies[id.number()].is_stiff; };
+    if (pair.is_own() || !(is_stiff(pair.points) || is_stiff(pair.touched))) return;
+    const Vec3f place = points.position(at);
+    const double push = double(force.dot(at.normal));
+    const auto number = [](ColliderId id) { return id.is_obstacle() ? BodyLoad::kObstacle : double(id.number()); };
+    if (is_stiff(pair.points))
+        loads_[pair.points.number()].add(push, at.normal, place, touched.velocity(at, place), pair.law.restitution,
+                                         number(pair.touched));
+    if (is_stiff(pair.touched))
+        loads_[pair.touched.number()].add(push, -at.normal, place, points.velocity(at), pair.law.restitution,
+                                          number(pair.points));
 }
 
 ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, float dt, RigidContacts& rigid,
@@ -204,6 +225,7 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
     ContactReport report;
     rigid.clear();
     touched_.assign(touched_.size(), 0);
+    loads_.assign(loads_.size(), {});
     for (std::size_t w = 0; w < work_.size(); ++w) {
         ContactPair& pair = pairs_[work_[w].pair];
         if (work_[w].block == 0) pair.deepest = 0;
@@ -215,11 +237,12 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
                 if (pair.is_rigid) {
                     rigid.add(contact_point(pair, at, force, bodies, poses));
                 } else {
+                    add_loads(pair, at, force, points, touched, bodies);
                     points.push(at, force);
                     touched.push(at, -force);
                 }
                 pair.deepest = std::max(pair.deepest, at.depth);
-                if (at.depth > 0) note_touch(pair, at.depth, report);
+                if (at.depth > 0) note_touch(pair, at, report);
             });
         });
     }
@@ -247,9 +270,9 @@ void Contacts::push_out(Candidate& at, const ContactPair& pair, const Points& po
 void Contacts::push_out(std::span<BodyState> bodies, double time, const RunContext& context) {
     const ObstaclePoses poses(world_, time);
     for (ContactPair& pair : pairs_) {
+        if (!is_too_deep(pair) || sleeps(pair, bodies)) continue;
         const bool may_crush = pair.touched.is_obstacle();
-        const float deep = may_crush ? CrushedParticles::kCrushing * pair.spacing : pair.most_depth();
-        if (pair.is_rigid || !(pair.deepest > deep) || sleeps(pair, bodies)) continue;
+        const float deep = first_depth(pair);
         Vec3f outwards = Vec3f::Zero(); // of what is deep
         with_sides(pair, bodies, poses, [&](const auto& points, const auto& touched) {
             for (Candidate& at : pair.candidates) {

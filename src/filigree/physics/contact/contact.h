@@ -65,6 +65,15 @@ public:
     /// the penalty can stop. Looks at what the last add_forces found.
     void push_out(std::span<BodyState> bodies, double time, const RunContext& context);
 
+    /// Whether a body touched anything, and slid along it, as of the last add_forces.
+    bool touches(std::size_t body) const { return touched_[body] != 0; }
+    bool rubs(std::size_t body) const { return (touched_[body] & kRubs) != 0; }
+    /// What pushes a stiff body, as of the last add_forces.
+    const BodyLoad& load(std::size_t body) const { return loads_[body]; }
+    /// Whether push_out may move anything.
+    bool is_too_deep() const {
+        return std::ranges::any_of(pairs_, [](const ContactPair& pair) { return is_too_deep(pair); });
+    }
     /// Calls visit(body) for each body that friction holds on an obstacle; more than once where on several.
     template <class Visit>
     void each_on_obstacle(const Visit& visit) const {
@@ -133,7 +142,15 @@ private:
     void push_out(Candidate& at, const ContactPair& pair, const Points& points, const Touched& touched) const;
     ContactPoint contact_point(ContactPair& pair, Candidate& at, const Vec3f& normal, std::span<BodyState> bodies,
                                const ObstaclePoses& poses) const;
-    void note_touch(const ContactPair& pair, float depth, ContactReport& report);
+    static bool is_too_deep(const ContactPair& pair) { return !pair.is_rigid && pair.deepest > first_depth(pair); }
+    /// m: what is deeper is looked at by push_out.
+    static float first_depth(const ContactPair& pair) {
+        return pair.touched.is_obstacle() ? CrushedParticles::kCrushing * pair.spacing : pair.most_depth();
+    }
+    void note_touch(const ContactPair& pair, const Candidate& at, ContactReport& report);
+    template <class Points, class Touched>
+    void add_loads(const ContactPair& pair, const Candidate& at, const Vec3f& force, const Points& points,
+                   const Touched& touched, std::span<const BodyState> bodies);
 
     ContactPair make_pair(ColliderId points, ColliderId touched, std::span<const BodyState> bodies) const;
     Box extent(const BodyState& body, std::size_t number) const;
@@ -178,8 +195,9 @@ private:
     std::optional<double> time_;       ///< s, of the last search
     std::vector<Work> work_;
     std::vector<Vec3f> forces_; ///< of each candidate of work_: N, or of a rigid pair the normal
-    static constexpr std::uint8_t kOnObstacle = 1, kInMatter = 2, kInItself = 4;
+    static constexpr std::uint8_t kOnObstacle = 1, kInMatter = 2, kInItself = 4, kRubs = 8;
     std::vector<std::uint8_t> touched_; ///< of each body
+    std::vector<BodyLoad> loads_;       ///< of each body, if it is stiff
 };
 
 } // namespace filigree

@@ -26,6 +26,7 @@ struct Candidate {
     Index point = 0;             ///< number of a body's surface point, or of a point on an obstacle's edges
     Matter::Place place;         ///< in matter: where it was found last
     float depth = 0;             ///< m, now; of rigid pairs below 0 where it is outside, but near
+    Vec3f normal{0, 0, 0};       ///< unit, in the world, out of what it touches
     contact_law::Grasp grasp;    ///< how friction holds it ...
     Matter::Place anchor;        ///< ... to this place; of an obstacle `local` is in its own axes, m
     Vec3f entry_normal{0, 0, 0}; ///< unit, at rest or in the obstacle's axes: where it came in; zero outside

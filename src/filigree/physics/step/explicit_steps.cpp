@@ -5,7 +5,9 @@
 #include "filigree/physics/rigid/rigid_body.h"
 #include "filigree/physics/rigid/rigid_state.h"
 #include "filigree/physics/step/simulation_state.h"
+#include "filigree/physics/step/stiff_hits.h"
 #include "filigree/physics/step/stopwatch.h"
+#include "filigree/physics/step/vibration.h"
 
 #include <algorithm>
 #include <cmath>
@@ -34,6 +36,7 @@ constexpr float kCrushedDelay = 0.5f; ///< ... to this where a cell is flat, sub
 /// Clay that is thrown at the ground would throw bits off, but for damping of waves of a few spacings [von Neumann
 /// 1950].
 constexpr float kFlowingDelay = 0.25f;    ///< of the time that a wave takes across a spacing
+constexpr float kRubbingDelay = 0.25f;    ///< substeps: of what slides along something (calm_rubbing): short waves
 constexpr float kLightDelay = 0.5f;       ///< substeps: of light corners, which would swing for ever ...
 constexpr float kFreeWay = 0.05f;         ///< spacings a substep: ... as far as they move faster
 constexpr double kMostDeforming = 0.5;    ///< spacings a substep, between particles of one body
@@ -149,8 +152,8 @@ class ExplicitSteps {
 public:
     ExplicitSteps(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context)
         : state_(state), bodies_(state.bodies), report_(report), context_(context), now_(from), until_(until),
-          meets_anything_(!state.world.obstacles.empty() || state.options.contacts_within_bodies ||
-                          (state.options.contacts_between_bodies && state.bodies.size() > 1)) {}
+          calmed_(from), meets_anything_(!state.world.obstacles.empty() || state.options.contacts_within_bodies ||
+                                         (state.options.contacts_between_bodies && state.bodies.size() > 1)) {}
 
     double run() {
         if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
@@ -175,6 +178,8 @@ public:
             find_contacts();
             find_forces(dt);
             finish(dt);
+            follow_hits(bodies_, state_.contacts, double(dt));
+            calm(!is_left());
             const Breaks breaks = break_bodies(state_, before, now_, context_);
             if (breaks.contacts) {
                 if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
@@ -205,11 +210,15 @@ private:
     /// The first half of the kick, and the drift.
     void move(float dt, double until) {
         const Stopwatch watch(report_.other_seconds);
+        each_elastic([&](BodyState& body, std::size_t b) {
+            if (vibrations_[b].elastic.size() > 0) debts_[b].begin(body, vibrations_[b].elastic, context_);
+        });
         kick(0.5f * dt, false);
         move_rigid(double(dt));
         drift(dt);
         const double before = std::exchange(now_, until);
         move_pins(state_, now_, dt);
+        make_way(state_, before, now_);
         if (meets_anything_) state_.contacts.travel(bodies_, dt, before, now_, context_);
     }
 
@@ -323,7 +332,8 @@ private:
         const float change = dt * change_of_acceleration(body, vibration.before, context_) /
                              float(pressure_wave_speed(body.body->material));
         const float noisy = kNoisyDelay * dt * std::clamp((change - kCalm) / (kNoisy - kCalm), 0.0f, 1.0f);
-        return std::max({usual, crushed, noisy});
+        const float rubbing = state_.contacts.rubs(b) ? kRubbingDelay * dt : 0;
+        return std::max({usual, crushed, noisy, rubbing});
     }
 
     /// is_again: nothing has moved since the last time.
@@ -331,6 +341,7 @@ private:
         const Stopwatch watch(report_.elastic_seconds);
         elastic_.resize(bodies_.size());
         vibrations_.resize(bodies_.size());
+        debts_.resize(bodies_.size());
         parallel_for(context_, bodies_.size(), kElasticGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t b = begin; b < end; ++b)
                 if (!bodies_[b].is_absent) find_elastic_forces_of(b, dt, is_again);
@@ -351,16 +362,26 @@ private:
         } else {
             elastic_[b] = body.elasticity->forces(body.positions, body.forces, context_);
         }
+        if (debts_[b].has_begun()) debts_[b].moved(body, body.forces);
+        const bool is_crushed = elastic_[b].least_volume_ratio < kCrushedFrom;
+        vibrations_[b].elastic = is_crushed ? body.forces : Vectors();
     }
 
     /// The second half of the kick, and what follows a substep.
     void finish(float dt) {
         {
             const Stopwatch watch(report_.contact_seconds);
+            if (state_.contacts.is_too_deep())
+                each_elastic([&](BodyState& body, std::size_t b) {
+                    if (state_.contacts.touches(b) && !debts_[b].has_begun()) debts_[b].before_push(body, context_);
+                });
             push_out(state_, now_, context_);
         }
         const Stopwatch watch(report_.other_seconds);
         kick(0.5f * dt, true);
+        each_elastic([&](BodyState& body, std::size_t b) {
+            if (debts_[b].has_begun()) debts_[b].end(body, context_);
+        });
         each_awake_rigid([&](BodyState& body, std::size_t b) {
             kick_rigid(body, rigid_loads_[b], Vec3d::Zero(), 0.5 * double(dt), 1);
             place_particles(body);
@@ -376,6 +397,24 @@ private:
             for (std::size_t b = begin; b < end; ++b)
                 if (!bodies_[b].sleeps()) visit(bodies_[b], b);
         });
+    }
+
+    /// Every few substeps: more often would cost more, and change nothing.
+    void calm(bool is_last) {
+        constexpr unsigned kEvery = 8;
+        if (!is_last && report_.substeps % kEvery != 0) return;
+        const double seconds = now_ - calmed_;
+        calmed_ = now_;
+        each_elastic([&](BodyState& body, std::size_t b) {
+            calm_rubbing(body, state_.contacts.touches(b), state_.contacts.rubs(b), seconds);
+        });
+    }
+
+    /// But for pieces of what breaks, whose copies have to move alike.
+    template <class Visit>
+    void each_elastic(const Visit& visit) {
+        for (std::size_t b = 0; b < state_.actor_count; ++b)
+            if (!bodies_[b].rigid && !bodies_[b].sleeps()) visit(bodies_[b], b);
     }
 
     template <class Visit>
@@ -421,14 +460,17 @@ private:
     FrameReport& report_;
     const RunContext& context_;
     double now_, until_;        // s
+    double calmed_;             ///< s: until when what rubs has been calmed
     const bool meets_anything_; // obstacles, other bodies or parts of the same
     std::vector<ElasticReport> elastic_;
     struct Vibration {           ///< of a body
         bool has_forces = false; ///< of this frame; those before it are not known after a restore
         Vectors before;          ///< N, the forces of the substep before; empty: not known
+        Vectors elastic;         ///< N, those of elasticity alone, where cells are crushed; else empty
         float delay = 0;         ///< s of internal damping
     };
     std::vector<Vibration> vibrations_;
+    std::vector<EnergyDebt> debts_;      ///< of each body, in this frame
     std::vector<RigidLoad> rigid_loads_; ///< of each body, by find_forces
     RigidContacts rigid_contacts_;       ///< the same
     double stable_step_ = 0;             // s

@@ -39,11 +39,33 @@ std::optional<RigidPose> read_pose(ByteReader& reader) {
     return pose;
 }
 
+/// Calls visit(number) for each, in order.
+template <class Hit, class Visit>
+void each_number(Hit& hit, const Visit& visit) {
+    visit(hit.seconds);
+    for (auto* v :
+         {&hit.pushed.normal, &hit.pushed.place, &hit.pushed.other_velocity, &hit.centre, &hit.velocity, &hit.spin})
+        for (int axis = 0; axis < 3; ++axis) visit((*v)[axis]);
+    for (auto* number : {&hit.pushed.force, &hit.pushed.restitution, &hit.pushed.other}) visit(*number);
+}
+
+void write_hit(ByteWriter& writer, const BodyHit& hit) {
+    each_number(hit, [&](const double& number) { writer.value(number); });
+}
+
+BodyHit read_hit(ByteReader& reader) {
+    BodyHit hit;
+    each_number(hit, [&](double& number) { number = reader.value<double>(); });
+    return hit;
+}
+
 void write_body(ByteWriter& writer, const SavedBody& body) {
     writer.value(std::uint64_t(body.positions.size()));
     writer.vectors(body.positions);
     writer.vectors(body.velocities);
     writer.array(std::span(body.elasticity));
+    writer.value(body.rubbed_seconds);
+    write_hit(writer, body.hit);
     write_pose(writer, body.rigid);
 }
 
@@ -54,6 +76,8 @@ SavedBody read_body(ByteReader& reader) {
     body.velocities = reader.vectors(count);
     const std::vector<char> elasticity = reader.array<char>();
     body.elasticity.assign(elasticity.begin(), elasticity.end());
+    body.rubbed_seconds = reader.value<float>();
+    body.hit = read_hit(reader);
     body.rigid = read_pose(reader);
     return body;
 }

@@ -14,6 +14,8 @@ namespace filigree {
 struct SavedBody {
     Vectors positions, velocities;
     std::string elasticity; ///< Elasticity::state
+    float rubbed_seconds = 0;
+    BodyHit hit;
     std::optional<RigidPose> rigid;
 };
 

@@ -12,6 +12,8 @@ SavedBody save_body(const BodyState& body) {
     return {.positions = body.positions,
             .velocities = body.velocities,
             .elasticity = body.elasticity->state(),
+            .rubbed_seconds = body.rubbed_seconds,
+            .hit = body.hit,
             .rigid = body.rigid};
 }
 
@@ -64,6 +66,10 @@ Status restore_state(SimulationState& state, SavedState saved) {
         if (body.rigid && !restore_pose(*body.rigid, *from.rigid)) return damaged;
         body.positions = std::move(from.positions);
         body.velocities = std::move(from.velocities);
+        if (!(from.rubbed_seconds >= 0)) return damaged;
+        body.rubbed_seconds = from.rubbed_seconds;
+        if (from.hit.pushed.other >= double(state.bodies.size())) return damaged;
+        body.hit = from.hit;
     }
     if (!state.grid->restore_state(saved.grid)) return other;
     for (BodyState& body : state.bodies)

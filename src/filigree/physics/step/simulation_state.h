@@ -65,6 +65,9 @@ void move_pins(SimulationState& state, double now, float dt, bool on_grid = fals
 /// Whether anything was done.
 bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic, FrameReport& report,
                   const RunContext& context);
+/// Where a half-space, a ball or a cuboid jumps into an elastic body between two times, the body is moved out of it as
+/// a whole, and gets no speed by it. Bodies with pins are left to push_out.
+void make_way(SimulationState& state, double before, double now);
 /// Moves out what contacts find too deep.
 void push_out(SimulationState& state, double now, const RunContext& context);
 /// Plastic flow.

@@ -48,6 +48,16 @@ std::size_t scale_down(BodyState& body, float factor) {
     return moved;
 }
 
+/// From the deepest of a body's surface points straight to the surface of an obstacle.
+Vec3f way_out(const BodyState& body, std::size_t obstacle, const ObstaclePoses& poses) {
+    DistanceField::Sample deepest{0, Vec3f::Zero()};
+    for (std::size_t s = 0; s < body.surface.size(); ++s) {
+        const auto found = poses.distance_to(obstacle, embedded_point(body.surface, s, body.positions));
+        if (found.distance < deepest.distance) deepest = found;
+    }
+    return -deepest.distance * deepest.normal;
+}
+
 } // namespace
 
 void note_deformation(FrameReport& report, std::size_t body, const ElasticReport& met) {
@@ -98,6 +108,27 @@ bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic
         state.contacts.was_placed(b);
     }
     return repaired;
+}
+
+void make_way(SimulationState& state, double before, double now) {
+    constexpr int kPasses = 3; // round the corners of a cuboid
+    const World& world = state.world;
+    for (std::size_t o = 0; o < world.obstacles.size(); ++o) {
+        if (!jumps_between(world.obstacles[o].motion, before, now)) continue;
+        if (std::holds_alternative<MeshObstacle>(world.obstacles[o].shape)) continue;
+        const ObstaclePoses poses(world, now);
+        for (std::size_t b = 0; b < state.bodies.size(); ++b) {
+            BodyState& body = state.bodies[b];
+            if (body.is_absent || body.rigid || body.actor != b) continue; // pieces have to move alike
+            if (std::ranges::any_of(body.fixed, [](std::uint8_t fixed) { return fixed != 0; })) continue;
+            for (int pass = 0; pass < kPasses; ++pass) {
+                const Vec3f out = way_out(body, o, poses);
+                if (out.isZero(0)) break;
+                for (std::size_t i = 0; i < body.positions.size(); ++i) body.positions.add(i, out);
+                state.contacts.was_moved(b, out.norm());
+            }
+        }
+    }
 }
 
 void push_out(SimulationState& state, double now, const RunContext& context) {
