@@ -223,7 +223,8 @@ ContactReport Contacts::add_obstacle_forces(BodyState& body, std::size_t b, cons
             if (!(points[k].depth > 0)) return;
             if (body.is_stiff) add_load(body, b, points[k], forces[k], poses);
             touched_[b] |= kOnObstacle;
-            if (points[k].grasp.slides) touched_[b] |= MatterContacts::kRubs;
+            if (points[k].grasp.slides && world_.obstacles[points[k].obstacle].friction > 0)
+                touched_[b] |= MatterContacts::kRubs;
             ++report.contacts;
             report.deepest = std::max(report.deepest, points[k].depth);
         });

@@ -248,7 +248,7 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
             add_to_particles(bodies[side.body].surface, pair.point, force, bodies[side.body].forces);
             matter_[side.other]->add(pair.place, -force, bodies[side.other].corner_forces());
         }
-        const auto touch = std::uint8_t(touch_of(side) | (pair.grasp.slides ? kRubs : 0));
+        const auto touch = std::uint8_t(touch_of(side) | (pair.grasp.slides && side.law.friction > 0 ? kRubs : 0));
         touched[side.body] |= touch;
         touched[side.other] |= touch;
         ++report.contacts;
