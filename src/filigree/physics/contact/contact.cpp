@@ -163,7 +163,7 @@ ContactPoint Contacts::contact_point(ContactPair& pair, Candidate& at, const Vec
 }
 
 void Contacts::note_touch(const ContactPair& pair, const Candidate& at, ContactReport& report) {
-    const std::uint8_t rubs = at.grasp.slides ? kRubs : 0;
+    const std::uint8_t rubs = at.grasp.slides && pair.law.friction > 0 ? kRubs : 0;
     ++report.contacts;
     if (pair.is_of_bodies()) {
         const auto touch = std::uint8_t((pair.is_own() ? kInItself : kInMatter) | rubs);

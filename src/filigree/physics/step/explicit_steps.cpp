@@ -332,7 +332,7 @@ private:
         const float change = dt * change_of_acceleration(body, vibration.before, context_) /
                              float(pressure_wave_speed(body.body->material));
         const float noisy = kNoisyDelay * dt * std::clamp((change - kCalm) / (kNoisy - kCalm), 0.0f, 1.0f);
-        const float rubbing = state_.contacts.rubs(b) ? kRubbingDelay * dt : 0;
+        const float rubbing = vibration.is_calmed ? kRubbingDelay * dt : 0;
         return std::max({usual, crushed, noisy, rubbing});
     }
 
@@ -406,7 +406,7 @@ private:
         const double seconds = now_ - calmed_;
         calmed_ = now_;
         each_elastic([&](BodyState& body, std::size_t b) {
-            calm_rubbing(body, state_.contacts.touches(b), state_.contacts.rubs(b), seconds);
+            vibrations_[b].is_calmed = calm_rubbing(body, state_.contacts.touches(b), state_.contacts.rubs(b), seconds);
         });
     }
 
@@ -465,6 +465,7 @@ private:
     std::vector<ElasticReport> elastic_;
     struct Vibration {           ///< of a body
         bool has_forces = false; ///< of this frame; those before it are not known after a restore
+        bool is_calmed = false;  ///< it rubs
         Vectors before;          ///< N, the forces of the substep before; empty: not known
         Vectors elastic;         ///< N, those of elasticity alone, where cells are crushed; else empty
         float delay = 0;         ///< s of internal damping

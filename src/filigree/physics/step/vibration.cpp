@@ -45,14 +45,15 @@ double thickness_frequency(const Body& body) {
     return std::numbers::pi * shear_wave_speed(body.material) / box_of(body.rest).size().minCoeff();
 }
 
-void calm_rubbing(BodyState& body, bool touches, bool rubs, double seconds) {
+bool calm_rubbing(BodyState& body, bool touches, bool rubs, double seconds) {
     const auto step = float(seconds);
     if (!touches) body.rubbed_seconds = std::max(0.0f, body.rubbed_seconds - step); // it may only hop
-    if (!touches || !rubs) return;
+    if (!touches || !rubs) return false;
     const double until_calmed = kUntilCalmed * 2 * std::numbers::pi / lowest_frequency(*body.body);
     body.rubbed_seconds = std::min(body.rubbed_seconds + step, float(2 * until_calmed));
-    if (double(body.rubbed_seconds) < until_calmed) return;
+    if (double(body.rubbed_seconds) < until_calmed) return false;
     scale_vibration(body, std::exp(-2 * kRubbingDamping * thickness_frequency(*body.body) * seconds));
+    return true;
 }
 
 void EnergyDebt::begin(const BodyState& body, const Vectors& forces, const RunContext& context) {

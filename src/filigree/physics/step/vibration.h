@@ -26,7 +26,8 @@ double thickness_frequency(const Body& body);
 /// After `seconds` of a frame. A body that rubs along something trembles by itself: friction grows with the load, and
 /// feeds vibrations in which both swing in time. Then the body slides where it should stick, and too fast. What has
 /// rubbed for two of its own vibrations is damped, as rubber is by itself; a hit is over before.
-void calm_rubbing(BodyState& body, bool touches, bool rubs, double seconds);
+/// Whether it is; short waves are left to internal damping.
+bool calm_rubbing(BodyState& body, bool touches, bool rubs, double seconds);
 
 /// Energy that a body has got from nowhere: where cells are crushed, elastic forces change faster than steps follow,
 /// and what is pushed out of matter is pressed together. It is taken from the body's vibration again.
