@@ -3,6 +3,7 @@
 #pragma once
 
 #include "filigree/physics/body/body_state.h"
+#include "filigree/physics/contact/contact_events.h"
 #include "filigree/physics/contact/feature_contacts.h"
 #include "filigree/physics/contact/matter_contact.h"
 #include "filigree/physics/contact/obstacle_motion.h"
@@ -17,10 +18,34 @@ namespace filigree {
 /// All contacts of a scene. Finding what is near is separate from forces, and rare.
 class Contacts {
 public:
-    /// bodies: fixed in number from here on.
     Contacts(const World& world, std::size_t bodies, std::size_t actors, bool between_bodies, bool within_bodies);
     /// Once, when all bodies are there.
     void begin(std::span<const BodyState> bodies);
+
+    // Between frames the world may change.
+    /// A body came into a slot: one that was free, or the next. Cost O(slots), and what the body itself takes; nothing
+    /// about the others is made anew but the next search.
+    void add_body(std::span<const BodyState> bodies, std::size_t body);
+    /// Forgets a body that is still there; its slot will be free.
+    void remove_body(std::span<const BodyState> bodies, std::size_t body);
+    /// An obstacle's motion was replaced. is_jump: it stands elsewhere, so that what was on its other side is where it
+    /// is, and nothing holds on to it; else points are followed to where it stands.
+    void set_obstacle(std::size_t obstacle, bool is_jump);
+    /// Calls visit(other) for bodies that touch a body, or may soon.
+    template <class Visit>
+    void each_beside(std::size_t body, const Visit& visit) const {
+        matter_.each_beside(body, visit);
+    }
+    /// Whether a body's surface touches an obstacle, or may soon.
+    bool is_beside_obstacle(std::size_t body, std::size_t obstacle) const {
+        return std::ranges::any_of(near_[body].points, [&](const Near& at) { return at.obstacle == obstacle; });
+    }
+    /// The cells of a body as matter that points are inside of; null of bodies without a field.
+    const Matter* matter(std::size_t body) const { return matter_.has_matter(body) ? &matter_.matter(body) : nullptr; }
+    std::span<const ObstacleShape> shapes() const { return shapes_; }
+    /// What touches in a frame.
+    ContactEvents& events() { return events_; }
+    const ContactEvents& events() const { return events_; }
 
     /// Finds what might touch before anything has moved by the reaches, unless what was found last still holds: surface
     /// points near obstacles and near cells of other bodies or far parts of their own.
@@ -121,6 +146,7 @@ public:
         std::vector<std::uint8_t> seen; ///< of each body and obstacle: 1 once sides are known
         std::vector<FeatureContacts::Near> features;
         MatterContacts::Memory matter;
+        std::vector<ContactEvents::PairMemory> touched; ///< in the last frame
     };
     Memory memory() const;
     /// Instead of what there is. False, and nothing changed, where it is not of these bodies.
@@ -130,11 +156,13 @@ private:
     /// A surface point near an obstacle.
     struct Near {
         Index obstacle, point;
-        float depth = 0; ///< m, now
+        float depth = 0;    ///< m, now
         contact_law::Grasp grasp;
         Vec3f anchor = Vec3f::Zero();
         Vec3f rigid_force = Vec3f::Zero(); ///< N, on a rigid body: of the last substep
         Index trace = kNoIndex;            ///< of the body's traces; none of a half-space
+        float approach = 0;                ///< m/s, along the normal, where it touches ...
+        Vec3f normal = Vec3f::Zero();      ///< ... of the obstacle there
     };
     struct NearPoints { ///< of a body
         static constexpr std::size_t kBlock = 64;
@@ -162,10 +190,13 @@ private:
     void push_particles_out(BodyState& body, std::size_t b, std::size_t obstacle, const Vec3f& outwards,
                             const ObstaclePoses& poses, const RunContext& context);
     void find_near(std::span<const BodyState> bodies, double time, float reach, const RunContext& context);
+    void tell(const Near& at, const Vec3f& force, const BodyState& body, std::size_t b, float dt);
     class NearFinder;
     void forget_jumps(double time);
     std::vector<DistanceField::Sample> depths_of_particles(const BodyState& body, std::size_t b, std::size_t obstacle,
                                                            const ObstaclePoses& poses, const RunContext& context);
+
+    Vec3f way_towards(std::size_t obstacle) const;
 
     const World& world_;
     std::vector<Vec3f> towards_;         ///< of each obstacle, the way to it: of half-spaces that stand still; else 0
@@ -186,6 +217,7 @@ private:
     std::vector<std::uint8_t> touched_; ///< of each body
     MatterContacts matter_;
     FeatureContacts features_;
+    ContactEvents events_;
 };
 
 } // namespace filigree

@@ -130,6 +130,7 @@ Vec3f Contacts::obstacle_force(Near& at, Trace* trace, float& clear_until, const
         return Vec3f::Zero();
     }
     at.depth = -surface.distance;
+    at.normal = surface.normal;
     const Touch touch{surface.normal,
                       embedded_point(body.surface, at.point, body.velocities) - poses.velocity(at.obstacle, place),
                       std::min(at.depth, kDeepest * float(body.body->spacing())), // deeper it is moved out
@@ -140,6 +141,7 @@ Vec3f Contacts::obstacle_force(Near& at, Trace* trace, float& clear_until, const
     Vec3f offset = Vec3f::Zero();
     if (at.grasp.holds) offset = along_surface(place - poses.to_world(at.obstacle, at.anchor), surface.normal);
     const bool landed = !at.grasp.holds;
+    at.approach = -touch.velocity.dot(touch.normal);
     const Vec3f force = touch_force(touch, offset, at.grasp, dt, smooth_speed(world_, dt));
     if (landed || at.grasp.slides) at.anchor = poses.to_own_axes(at.obstacle, place - offset);
     return force;
@@ -168,6 +170,7 @@ ContactPoint Contacts::contact_point(Near& at, const Vec3f& normal, Index b, con
     const Obstacle& obstacle = world_.obstacles[at.obstacle];
     const Vec3f place = embedded_point(body.surface, at.point, body.positions);
     return {.body = b,
+            .obstacle = at.obstacle,
             .place = place,
             .normal = normal,
             .separation = -at.depth,
@@ -213,6 +216,7 @@ ContactReport Contacts::add_obstacle_forces(BodyState& body, std::size_t b, cons
             else
                 add_to_particles(body.surface, points[k].point, forces[k], body.forces);
             if (!(points[k].depth > 0)) return;
+            if (!body.rigid) tell(points[k], forces[k], body, b, dt);
             touched_[b] |= kOnObstacle;
             ++report.contacts;
             report.deepest = std::max(report.deepest, points[k].depth);
@@ -221,9 +225,16 @@ ContactReport Contacts::add_obstacle_forces(BodyState& body, std::size_t b, cons
     return report;
 }
 
+/// A point that touches, for the frame's events.
+void Contacts::tell(const Near& at, const Vec3f& force, const BodyState& body, std::size_t b, float dt) {
+    events_.touch(Index(b), Touched::obstacle(at.obstacle), embedded_point(body.surface, at.point, body.positions),
+                  at.normal, dt * force.dot(at.normal), at.approach);
+}
+
 ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, float dt, RigidContacts& rigid,
                                    const RunContext& context) {
     ContactReport report;
+    events_.begin_forces();
     rigid.clear();
     std::vector<std::vector<ContactPoint>> points(bodies.size());
     const ObstaclePoses poses(world_, time);
@@ -243,10 +254,10 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
         report.contacts += of_body.contacts;
         report.deepest = std::max(report.deepest, of_body.deepest);
     }
-    const ContactReport at_edges = features_.add_forces(bodies, shapes_, matter_, poses, dt, near_way_, touched_);
+    const ContactReport at_edges = features_.add_forces(bodies, shapes_, matter_, poses, dt, near_way_, touched_, events_);
     report.contacts += at_edges.contacts;
     report.deepest = std::max(report.deepest, at_edges.deepest);
-    const ContactReport inside = matter_.add_forces(bodies, dt, touched_, rigid, context);
+    const ContactReport inside = matter_.add_forces(bodies, dt, touched_, rigid, events_, context);
     report.contacts += inside.contacts;
     report.deepest_in_matter = inside.deepest_in_matter;
     return report;
@@ -274,14 +285,15 @@ void Contacts::push_out(std::span<BodyState> bodies, double time, const RunConte
             const float too_deep = -surface.distance - most;
             const Vec3f way = too_deep / gives * surface.normal;
             const Vec3f push = -inwards / gives * surface.normal;
+            events_.push(Index(b), Touched::obstacle(at.obstacle), place, surface.normal, -inwards / gives);
             for (Index k = body.surface.offsets[at.point]; k < body.surface.offsets[at.point + 1]; ++k)
                 push_particle(body, body.surface.particles[k], body.surface.weights[k], way, push, too_deep);
         }
         for (std::size_t o = 0; o < outwards.size(); ++o)
             if (!outwards[o].isZero(0)) push_particles_out(body, b, o, outwards[o], poses, context);
     }
-    features_.push_out(bodies, matter_);
-    matter_.push_out(bodies);
+    features_.push_out(bodies, matter_, events_);
+    matter_.push_out(bodies, events_);
 }
 
 /// How deep each particle is in an obstacle: below 0 behind its surface. Particles are not followed; beside what a

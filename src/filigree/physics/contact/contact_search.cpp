@@ -17,17 +17,59 @@ constexpr std::size_t kContactSearchGrain = 256;
 Contacts::Contacts(const World& world, std::size_t bodies, std::size_t actors, bool between_bodies, bool within_bodies)
     : world_(world), near_(bodies), deepest_near_(bodies, 0), touched_(bodies, 0),
       matter_(world, actors, between_bodies, within_bodies), features_(world) {
-    for (const Obstacle& obstacle : world.obstacles) {
-        const auto* ground = std::get_if<HalfSpace>(&obstacle.shape);
-        const bool stands = ground && !obstacle.motion.moves();
-        const Vec3d out = stands ? Vec3d(obstacle.motion.at(0).linear() * ground->normal.normalized()) : Vec3d::Zero();
-        towards_.push_back(-out.cast<float>());
-        shapes_.emplace_back(obstacle);
+    for (std::size_t o = 0; o < world.obstacles.size(); ++o) {
+        towards_.push_back(way_towards(o));
+        shapes_.emplace_back(world.obstacles[o]);
     }
     seen_.resize(bodies * shapes_.size());
+    events_.resize(bodies);
+}
+
+Vec3f Contacts::way_towards(std::size_t obstacle) const {
+    const RigidMotion& motion = world_.obstacles[obstacle].motion;
+    const auto* ground = std::get_if<HalfSpace>(&world_.obstacles[obstacle].shape);
+    if (!ground || motion.moves()) return Vec3f::Zero();
+    return -(motion.at(0).linear() * ground->normal.normalized()).cast<float>();
 }
 
 void Contacts::begin(std::span<const BodyState> bodies) { matter_.begin(bodies); }
+
+void Contacts::add_body(std::span<const BodyState> bodies, std::size_t body) {
+    matter_.add_body(bodies, body);
+    if (body >= near_.size()) {
+        near_.resize(body + 1);
+        deepest_near_.resize(body + 1);
+        touched_.resize(body + 1);
+        seen_.resize((body + 1) * shapes_.size());
+        events_.resize(body + 1);
+    }
+    near_until_ = -1;
+}
+
+void Contacts::remove_body(std::span<const BodyState> bodies, std::size_t body) {
+    const auto is_of_kind = [&](const BodyState& other) { return other.body == bodies[body].body; };
+    if (std::ranges::count_if(bodies, is_of_kind) == 1) particle_depths_.erase(bodies[body].body.get());
+    near_[body] = {};
+    deepest_near_[body] = 0;
+    touched_[body] = 0;
+    was_placed(body);
+    features_.remove_body(body);
+    matter_.remove_body(bodies, body);
+}
+
+void Contacts::set_obstacle(std::size_t obstacle, bool is_jump) {
+    towards_[obstacle] = way_towards(obstacle);
+    near_until_ = -1;
+    if (!is_jump) return;
+    for (std::size_t b = 0; b < near_.size(); ++b) {
+        seen_[b * shapes_.size() + obstacle] = 0;
+        for (Near& at : near_[b].points)
+            if (at.obstacle == obstacle) {
+                at.grasp = {};
+                at.rigid_force = Vec3f::Zero();
+            }
+    }
+}
 
 void Contacts::search(std::span<BodyState> bodies, const Search& search, const RunContext& context) {
     if (matter_.search(bodies, search.frame, context)) look_near_again();
@@ -195,7 +237,7 @@ void Contacts::find_near(std::span<const BodyState> bodies, double time, float r
 }
 
 Contacts::Memory Contacts::memory() const {
-    Memory memory{{}, near_way_, near_until_, seen_, features_.near(), matter_.memory()};
+    Memory memory{{}, near_way_, near_until_, seen_, features_.near(), matter_.memory(), events_.memory()};
     for (Index b = 0; b < near_.size(); ++b)
         for (std::size_t k = 0; k < near_[b].points.size(); ++k) {
             const Near& at = near_[b].points[k];
@@ -236,6 +278,7 @@ bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodie
     features_.set_near(memory.features);
     time_.reset();
     matter_.set_memory(memory.matter, bodies);
+    events_.set_memory(memory.touched);
     return true;
 }
 

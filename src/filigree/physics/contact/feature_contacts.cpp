@@ -130,7 +130,7 @@ float FeatureContacts::stiffness(const BodyState& body, const Matter& matter, co
 
 ContactReport FeatureContacts::add_forces(std::span<BodyState> bodies, std::span<const ObstacleShape> shapes,
                                           const MatterContacts& matter, const ObstaclePoses& poses, float dt, float way,
-                                          std::span<std::uint8_t> touched) {
+                                          std::span<std::uint8_t> touched, ContactEvents& events) {
     ContactReport report;
     deep_.clear();
     for (Near& near : near_) {
@@ -177,18 +177,21 @@ ContactReport FeatureContacts::add_forces(std::span<BodyState> bodies, std::span
         Vec3f offset = Vec3f::Zero();
         const Vec3f slip = along_surface(velocity, depth->normal);
         if (slip.norm() > 0) offset = slip.normalized() * touch.friction * touch.depth / kTangentialStiffness;
-        of.add(place, -touch_force(touch, offset, grasp, dt, smooth_speed(world_, dt)), body.corner_forces());
+        const Vec3f force = touch_force(touch, offset, grasp, dt, smooth_speed(world_, dt));
+        of.add(place, -force, body.corner_forces());
+        events.touch(near.body, Touched::obstacle(near.obstacle), point, -depth->normal, dt * force.dot(depth->normal),
+                     -velocity.dot(depth->normal));
         touched[near.body] |= MatterContacts::kTouched;
         ++report.contacts;
         report.deepest = std::max(report.deepest, deep);
         if (deep > deepest)
-            deep_.push_back({near.body, place, depth->normal, poses.velocity(near.obstacle, point),
+            deep_.push_back({near.body, near.obstacle, place, depth->normal, poses.velocity(near.obstacle, point),
                              std::min(deep - deepest, float(spacing))});
     }
     return report;
 }
 
-void FeatureContacts::push_out(std::span<BodyState> bodies, const MatterContacts& matter) const {
+void FeatureContacts::push_out(std::span<BodyState> bodies, const MatterContacts& matter, ContactEvents& events) const {
     for (const Deep& deep : deep_) {
         BodyState& body = bodies[deep.body];
         const Matter& of = matter.matter(deep.body);
@@ -199,6 +202,8 @@ void FeatureContacts::push_out(std::span<BodyState> bodies, const MatterContacts
         const float inwards =
             std::max(0.0f, (of.mean(deep.place, body.corner_velocities()) - deep.velocity).dot(deep.normal));
         const Vec3f way = -deep.depth / gives * deep.normal, push = -inwards / gives * deep.normal;
+        events.push(deep.body, Touched::obstacle(deep.obstacle), of.mean(deep.place, body.corner_positions()),
+                    -deep.normal, inwards / gives);
         for (const auto& [particle, weight] : carriers)
             if (weight != 0) push_particle(body, particle, weight, way, push, deep.depth);
     }

@@ -20,9 +20,13 @@ public:
     /// way: m that anything may have come nearer to obstacles since the search. touched: as Contacts::add_forces.
     ContactReport add_forces(std::span<BodyState> bodies, std::span<const ObstacleShape> shapes,
                              const MatterContacts& matter, const ObstaclePoses& poses, float dt, float way,
-                             std::span<std::uint8_t> touched);
+                             std::span<std::uint8_t> touched, ContactEvents& events);
     /// Of what add_forces found too deep.
-    void push_out(std::span<BodyState> bodies, const MatterContacts& matter) const;
+    void push_out(std::span<BodyState> bodies, const MatterContacts& matter, ContactEvents& events) const;
+    void remove_body(std::size_t body) {
+        std::erase_if(near_, [&](const Near& at) { return at.body == body; });
+        deep_.clear();
+    }
 
     /// A point near a body. Saved as it is.
     struct Near {
@@ -38,7 +42,7 @@ public:
 
 private:
     struct Deep { ///< to be pushed out
-        Index body;
+        Index body, obstacle;
         Matter::Place place;
         Vec3f normal, velocity; ///< outwards; of the obstacle's point
         float depth;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/physics/body/body_state.h"
+#include "filigree/physics/contact/contact_events.h"
 #include "filigree/physics/contact/contact_law.h"
 #include "filigree/physics/contact/extremes_kernel.h"
 #include "filigree/physics/contact/matter.h"
@@ -46,6 +47,15 @@ public:
 
     /// Once, when all bodies are there.
     void begin(std::span<const BodyState> bodies);
+    /// As of Contacts.
+    void add_body(std::span<const BodyState> bodies, std::size_t body);
+    void remove_body(std::span<const BodyState> bodies, std::size_t body);
+    template <class Visit>
+    void each_beside(std::size_t body, const Visit& visit) const {
+        for (const Side& side : sides_)
+            if (!side.pairs.empty() && side.body != side.other && (side.body == body || side.other == body))
+                visit(side.body == body ? side.other : side.body);
+    }
 
     /// The next search finds everything again; what touches is remembered.
     void begin_anew();
@@ -98,9 +108,9 @@ public:
     static constexpr std::uint8_t kTouched = 2, kTouchedItself = 4;
     /// As Contacts::add_forces. touched: of each body; kTouched or kTouchedItself is set where it touches.
     ContactReport add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
-                             RigidContacts& rigid, const RunContext& context);
+                             RigidContacts& rigid, ContactEvents& events, const RunContext& context);
     /// As Contacts::push_out.
-    void push_out(std::span<BodyState> bodies);
+    void push_out(std::span<BodyState> bodies, ContactEvents& events);
 
     /// A surface point in or near a cell of `other`.
     struct Pair {
@@ -108,6 +118,8 @@ public:
         Matter::Place place;
         float clear_until = 0; ///< way of the side until which this cannot touch
         float depth = 0;       ///< now
+        float approach = 0;    ///< m/s, along the normal, where it touches ...
+        Vec3f normal = Vec3f::Zero(); ///< ... of the other there
         contact_law::Grasp grasp;
         Matter::Place anchor;
         Vec3f entry = Vec3f::Zero();       ///< normal at rest on the side where the point came in; zero outside
@@ -161,6 +173,7 @@ private:
     float moved(const Side& side) const {
         return side.moved + Extremes::between(shifts_[side.body], shifts_[side.other]);
     }
+    void make_ready(const BodyState& state, std::size_t body, std::size_t like);
     void count_from_here(std::span<const BodyState> bodies);
     void find_shifts(std::span<const BodyState> bodies, const RunContext& context);
     Side make_side(Index body, Index other, std::span<const BodyState> bodies) const;
@@ -207,7 +220,7 @@ private:
     Vec3f probe(Pair& pair, const Side& side, std::span<const BodyState> bodies) const;
     static void add_contact_point(Pair& pair, const Side& side, std::span<const BodyState> bodies, const Vec3f& normal,
                                   RigidContacts& rigid);
-    void push_out(Pair& pair, const Side& side, std::span<BodyState> bodies) const;
+    void push_out(Pair& pair, const Side& side, std::span<BodyState> bodies, ContactEvents& events) const;
 
     const World& world_;
     const PairLaws laws_;

@@ -157,6 +157,8 @@ Vec3f MatterContacts::force(Pair& pair, const Side& side, std::span<const BodySt
                       float(side.law.friction),
                       float(side.law.restitution),
                       std::max(body.rest_squared_frequency, other.rest_squared_frequency)};
+    pair.normal = touch.normal;
+    pair.approach = -touch.velocity.dot(touch.normal);
     const Vec3f place = matter.mean(pair.place, other.corner_positions());
     Vec3f offset = Vec3f::Zero();
     if (pair.grasp.holds)
@@ -210,7 +212,7 @@ void MatterContacts::anchor_at(Pair& pair, const Side& side, const BodyState& ot
 }
 
 ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, std::span<std::uint8_t> touched,
-                                         RigidContacts& rigid, const RunContext& context) {
+                                         RigidContacts& rigid, ContactEvents& events, const RunContext& context) {
     ContactReport report;
     is_too_deep_ = false;
     forces_.resize(work_.size());
@@ -232,6 +234,10 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
         if (!side.is_rigid) {
             add_to_particles(bodies[side.body].surface, pair.point, force, bodies[side.body].forces);
             matter_[side.other]->add(pair.place, -force, bodies[side.other].corner_forces());
+            if (side.body != side.other)
+                events.touch(side.body, Touched::body(side.other),
+                             embedded_point(bodies[side.body].surface, pair.point, bodies[side.body].positions),
+                             pair.normal, dt * force.dot(pair.normal), pair.approach);
         }
         touched[side.body] |= touch_of(side);
         touched[side.other] |= touch_of(side);
@@ -245,17 +251,17 @@ ContactReport MatterContacts::add_forces(std::span<BodyState> bodies, float dt, 
     return report;
 }
 
-void MatterContacts::push_out(std::span<BodyState> bodies) {
+void MatterContacts::push_out(std::span<BodyState> bodies, ContactEvents& events) {
     if (!is_too_deep_) return;
     for (Side& side : sides_) {
         const float most = most_depth(side);
         if (both_sleep(side, bodies) || side.is_rigid) continue;
         for (Pair& pair : side.pairs)
-            if (pair.depth > most) push_out(pair, side, bodies);
+            if (pair.depth > most) push_out(pair, side, bodies, events);
     }
 }
 
-void MatterContacts::push_out(Pair& pair, const Side& side, std::span<BodyState> bodies) const {
+void MatterContacts::push_out(Pair& pair, const Side& side, std::span<BodyState> bodies, ContactEvents& events) const {
     const std::optional<Vec3f> normal = enter(pair, side, bodies); // others have moved it since
     const float too_deep = pair.depth - most_depth(side);
     if (!normal || !(too_deep > 0)) return;
@@ -269,6 +275,8 @@ void MatterContacts::push_out(Pair& pair, const Side& side, std::span<BodyState>
         embedded_point(body.surface, pair.point, body.velocities) - matter.mean(pair.place, other.corner_velocities());
     const Vec3f way = too_deep / gives * *normal;
     const Vec3f push = std::max(0.0f, -velocity.dot(*normal)) / gives * *normal;
+    events.push(side.body, Touched::body(side.other), matter.mean(pair.place, other.corner_positions()), *normal,
+                push.norm());
     for (Index k = body.surface.offsets[pair.point]; k < body.surface.offsets[pair.point + 1]; ++k)
         push_particle(body, body.surface.particles[k], body.surface.weights[k], way, push, too_deep);
     for (const auto& [particle, weight] : carriers) push_particle(other, particle, -weight, way, push, too_deep);

@@ -157,25 +157,53 @@ Box MatterContacts::extent(const BodyState& body, std::size_t number) const {
 }
 
 void MatterContacts::begin(std::span<const BodyState> bodies) {
-    std::map<const Body*, std::shared_ptr<const Matter>> known; // pieces of one kind share theirs
-    std::map<const Matter*, std::shared_ptr<const OwnCells>> own_cells;
-    std::map<const Body*, std::shared_ptr<const Followed>> known_followed;
-    for (const BodyState& state : bodies) {
-        std::shared_ptr<const Matter>& matter = known[state.body.get()];
-        if (!matter && state.body->field) matter = std::make_shared<Matter>(*state.body);
-        matter_.push_back(matter);
-        per_area_.push_back(matter ? stiffness_per_area(state) : std::vector<float>());
-        std::shared_ptr<const OwnCells>& own = own_cells[matter.get()];
-        if (matter && within_bodies_ && !state.rigid && !own) own = std::make_shared<OwnCells>(*matter);
-        own_cells_.push_back(own);
-        std::shared_ptr<const Followed>& follows = known_followed[state.body.get()];
-        if (!follows) follows = std::make_shared<const Followed>(followed(state));
-        followed_.push_back(follows);
+    std::map<const Body*, std::size_t> first; // of its kind: pieces of one kind share what belongs to the kind
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+        make_ready(bodies[b], b, first.emplace(bodies[b].body.get(), b).first->second);
+}
+
+/// like: a body of its kind that is ready, or itself.
+void MatterContacts::make_ready(const BodyState& state, std::size_t body, std::size_t like) {
+    if (body >= matter_.size()) {
+        matter_.resize(body + 1);
+        per_area_.resize(body + 1);
+        own_cells_.resize(body + 1);
+        followed_.resize(body + 1);
+        speeds_.resize(body + 1);
+        places_.resize(body + 1);
+        shifts_.resize(body + 1);
+        recovers_.resize(body + 1);
     }
-    speeds_.resize(bodies.size());
-    places_.resize(bodies.size());
-    shifts_.resize(bodies.size());
-    recovers_.assign(bodies.size(), 0);
+    if (like != body) {
+        matter_[body] = matter_[like];
+        own_cells_[body] = own_cells_[like];
+        followed_[body] = followed_[like];
+    } else {
+        matter_[body] = state.body->field ? std::make_shared<Matter>(*state.body) : nullptr;
+        const bool meets_itself = matter_[body] && within_bodies_ && !state.rigid;
+        own_cells_[body] = meets_itself ? std::make_shared<OwnCells>(*matter_[body]) : nullptr;
+        followed_[body] = std::make_shared<const Followed>(followed(state));
+    }
+    per_area_[body] = matter_[body] ? stiffness_per_area(state) : std::vector<float>();
+}
+
+void MatterContacts::add_body(std::span<const BodyState> bodies, std::size_t body) {
+    std::size_t like = 0;
+    while (like < matter_.size() && (like == body || bodies[like].body != bodies[body].body)) ++like;
+    make_ready(bodies[body], body, like < matter_.size() ? like : body);
+    sides_until_ = -1; // it may be near others
+}
+
+void MatterContacts::remove_body(std::span<const BodyState> bodies, std::size_t body) {
+    std::erase_if(sides_, [&](const Side& side) { return side.body == body || side.other == body; });
+    matter_[body] = nullptr;
+    own_cells_[body] = nullptr;
+    followed_[body] = nullptr;
+    per_area_[body] = {};
+    places_[body] = {};
+    speeds_[body] = shifts_[body] = {};
+    recovers_[body] = 0;
+    list_work(bodies);
 }
 
 void MatterContacts::begin_anew() {

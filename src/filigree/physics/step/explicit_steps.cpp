@@ -231,6 +231,7 @@ private:
             if (!rigid_contacts_.pushes(b)) body.rigid->centre -= 0.5 * dt * dt * gravity;
         });
         rigid_contacts_.finish(bodies_, dt, double(contact_law::smooth_speed(state_.world, float(dt))));
+        state_.contacts.events().push(rigid_contacts_.points());
         place_rigid();
     }
 
@@ -372,6 +373,7 @@ private:
         {
             const Stopwatch watch(report_.contact_seconds);
             push_out(state_, now_, context_);
+            state_.contacts.events().keep_forces();
         }
         const Stopwatch watch(report_.other_seconds);
         kick(0.5f * dt, true);

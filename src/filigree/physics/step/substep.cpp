@@ -57,8 +57,13 @@ void note_deformation(FrameReport& report, std::size_t body, const ElasticReport
     report.most_crushed = body;
 }
 
-const Cracks* SimulationState::cracks_of(std::size_t body) const {
-    const auto found = std::ranges::find(cracks, body, &Cracks::whole);
+const BodyState& SimulationState::body_of(std::size_t actor) const {
+    static const BodyState nothing = free_slot();
+    return has(actor) ? bodies[slot_of[actor]] : nothing;
+}
+
+const Cracks* SimulationState::cracks_of(std::size_t slot) const {
+    const auto found = std::ranges::find(cracks, slot, &Cracks::whole);
     return found == cracks.end() ? nullptr : &*found;
 }
 
