@@ -130,7 +130,8 @@ TEST(ContactEvents, AreTheSameForAnyThreadsAndAfterARestore) {
     const auto soft = box(3, 3, 3, 0.1, material(MaterialModel::fem, 1e5));
     const auto block = box(2, 2, 2, 0.1, material(MaterialModel::rigid));
     const auto begin = [&] {
-        return simulation(with_ground(), {actor(soft, {0, 0.01, 0}), actor(block, {0.05, 0.33, 0}), actor(block, {1, 0.1, 0})});
+        return simulation(with_ground(),
+                          {actor(soft, {0, 0.01, 0}), actor(block, {0.05, 0.33, 0}), actor(block, {1, 0.1, 0})});
     };
     Simulation one = begin(), many = begin(), resumed = begin();
     const auto same = [](const Simulation& a, const Simulation& b) {
@@ -211,7 +212,9 @@ TEST(Ray, MeetsBodiesAsTheyAreNow) {
             const std::size_t attached = world.attach(0, std::span(&hit->rest, 1), kOneThread);
             std::vector<Vec3f> place(1);
             world.attached(attached, place, {}, kOneThread);
-            EXPECT_LT((place[0].cast<double>() - hit->place).norm(), 0.01) << int(model);
+            // Without cells points go along with the particles around them, and the surface with its corners.
+            const double near = model == MaterialModel::meshfree ? 0.03 : 1e-3;
+            EXPECT_LT((place[0].cast<double>() - hit->place).norm(), near) << int(model);
             // And it is on the surface at rest, a cube.
             const Vec3d from_middle = (hit->rest.cast<double>() - Vec3d::Constant(0.15)).cwiseAbs();
             EXPECT_NEAR(from_middle.maxCoeff(), 0.15, 0.01);

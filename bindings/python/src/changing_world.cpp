@@ -18,8 +18,7 @@ std::vector<std::string> doubts_of(const PySimulation& self, const Actor& actor,
     std::vector<std::string> sentences;
     const World& world = self.simulation.world();
     const std::string name = "Body " + std::to_string(number);
-    const std::string weight =
-        weight_warning(*actor.body, actor.placement.linear(), world.gravity, "such soft matter");
+    const std::string weight = weight_warning(*actor.body, actor.placement.linear(), world.gravity, "such soft matter");
     if (!weight.empty()) sentences.push_back(name + " " + weight);
     std::vector<Actor> there;
     for (const std::optional<PyBody>& body : self.bodies)
@@ -44,9 +43,9 @@ std::size_t add_body(PySimulation& self, const py::object& given) {
         self.bodies.emplace_back(actor.body);
         for (const StartOverlap& overlap : self.simulation.start_overlaps())
             if (overlap.body == added)
-                sentences.push_back(overlap.sentence("body " + std::to_string(added),
-                                                     "obstacle " + std::to_string(overlap.obstacle)) +
-                                    ".");
+                sentences.push_back(
+                    overlap.sentence("body " + std::to_string(added), "obstacle " + std::to_string(overlap.obstacle)) +
+                    ".");
         return added;
     });
     warn(sentences);
@@ -61,8 +60,8 @@ void remove_body(PySimulation& self, std::size_t body) {
 }
 
 /// Of 4 x 4 numbers, or turned about the obstacle's middle and moved from where its shape was made.
-Eigen::Isometry3d pose_of(PySimulation& self, std::size_t obstacle, const py::object& move, const py::object& axis,
-                          double degrees, const py::object& matrix) {
+Eigen::Isometry3d stance_of(PySimulation& self, std::size_t obstacle, const py::object& move, const py::object& axis,
+                            double degrees, const py::object& matrix) {
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     if (!matrix.is_none()) {
         const Numbers<double> numbers = doubles_of(matrix, "matrix");
@@ -70,7 +69,8 @@ Eigen::Isometry3d pose_of(PySimulation& self, std::size_t obstacle, const py::ob
             refuse("matrix has to be of shape (4, 4).");
         for (int row = 0; row < 4; ++row)
             for (int column = 0; column < 4; ++column) pose.matrix()(row, column) = numbers.at(row, column);
-        if (pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1)) refuse("matrix has to end with the row 0, 0, 0, 1.");
+        if (pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+            refuse("matrix has to end with the row 0, 0, 0, 1.");
         return pose;
     }
     const Vec3d about = vector_of(axis, "axis"), by = vector_of(move, "move");
@@ -79,14 +79,14 @@ Eigen::Isometry3d pose_of(PySimulation& self, std::size_t obstacle, const py::ob
         const std::vector<Obstacle>& all = self.simulation.world().obstacles;
         return obstacle < all.size() ? pivot_of(all[obstacle]) : Vec3d(Vec3d::Zero()); // refused with the rest
     });
-    return Eigen::Translation3d(pivot + by) *
-           Eigen::AngleAxisd(degrees * std::numbers::pi / 180, about.normalized()) * Eigen::Translation3d(-pivot);
+    return Eigen::Translation3d(pivot + by) * Eigen::AngleAxisd(degrees * std::numbers::pi / 180, about.normalized()) *
+           Eigen::Translation3d(-pivot);
 }
 
 void set_obstacle(PySimulation& self, std::size_t obstacle, const py::object& move, const py::object& axis,
                   double degrees, const py::object& matrix, const py::object& velocity, const py::object& spin,
                   const py::object& spin_degrees) {
-    const Eigen::Isometry3d pose = pose_of(self, obstacle, move, axis, degrees, matrix);
+    const Eigen::Isometry3d pose = stance_of(self, obstacle, move, axis, degrees, matrix);
     const Vec3d goes = vector_of(velocity, "velocity");
     if (!spin.is_none() && !spin_degrees.is_none()) refuse("Give one of spin (rad/s) and spin_degrees (degrees/s).");
     Vec3d turns = Vec3d::Zero();
@@ -97,7 +97,7 @@ void set_obstacle(PySimulation& self, std::size_t obstacle, const py::object& mo
 
 void move_obstacle(PySimulation& self, std::size_t obstacle, const py::object& move, const py::object& axis,
                    double degrees, const py::object& matrix) {
-    const Eigen::Isometry3d pose = pose_of(self, obstacle, move, axis, degrees, matrix);
+    const Eigen::Isometry3d pose = stance_of(self, obstacle, move, axis, degrees, matrix);
     self.alone([&] { return self.simulation.move_obstacle(obstacle, pose).value(); });
 }
 
@@ -199,17 +199,20 @@ UsageError
 )")
         .def(
             "has_body",
-            [](PySimulation& self, std::size_t body) { return self.alone([&] { return self.simulation.has_body(body); }); },
+            [](PySimulation& self, std::size_t body) {
+                return self.alone([&] { return self.simulation.has_body(body); });
+            },
             py::arg("body"), R"(has_body(self, body)
 --
 
 Whether there is a body of this number, and it was not removed.
 )")
-        .def("set_obstacle", &set_obstacle, py::arg("obstacle"), py::kw_only(),
-             py::arg("move") = py::make_tuple(0, 0, 0), py::arg("axis") = py::make_tuple(0, 1, 0),
-             py::arg("degrees") = 0.0, py::arg("matrix") = py::none(), py::arg("velocity") = py::make_tuple(0, 0, 0),
-             py::arg("spin") = py::none(), py::arg("spin_degrees") = py::none(),
-             R"(set_obstacle(self, obstacle, *, move=(0, 0, 0), axis=(0, 1, 0), degrees=0.0, matrix=None, velocity=(0, 0, 0), spin=None, spin_degrees=None)
+        .def(
+            "set_obstacle", &set_obstacle, py::arg("obstacle"), py::kw_only(),
+            py::arg("move") = py::make_tuple(0, 0, 0), py::arg("axis") = py::make_tuple(0, 1, 0),
+            py::arg("degrees") = 0.0, py::arg("matrix") = py::none(), py::arg("velocity") = py::make_tuple(0, 0, 0),
+            py::arg("spin") = py::none(), py::arg("spin_degrees") = py::none(),
+            R"(set_obstacle(self, obstacle, *, move=(0, 0, 0), axis=(0, 1, 0), degrees=0.0, matrix=None, velocity=(0, 0, 0), spin=None, spin_degrees=None)
 --
 
 From now on an obstacle stands somewhere, and goes on at a constant pace until it is set again. What touches it feels

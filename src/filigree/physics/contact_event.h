@@ -19,7 +19,7 @@ struct ContactEvent {
     Vec3d place = Vec3d::Zero();         ///< world, m: the middle of what touched, by how hard; of `ended` the last one
     Vec3d normal = Vec3d::Zero();        ///< unit, towards `body`
     double impulse = 0;                  ///< N s, along the normal, of the whole frame
-    double speed = 0; ///< m/s, the largest with which points that touch came nearer along the normal
+    double speed = 0;                    ///< m/s, the largest with which points that touch came nearer along the normal
 };
 
 } // namespace filigree

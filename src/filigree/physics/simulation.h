@@ -5,8 +5,8 @@
 #include "filigree/physics/contact_event.h"
 #include "filigree/physics/fracture.h"
 #include "filigree/physics/matter_particles.h"
-#include "filigree/physics/world_hit.h"
 #include "filigree/physics/world.h"
+#include "filigree/physics/world_hit.h"
 
 namespace filigree {
 
@@ -146,17 +146,18 @@ public:
 
     /// One more body, from now on. It touches others as body_friction and body_restitution say. Returns its number, the
     /// next. Cost: as for that body in create, and O(bodies). Errors: usage (as check_actor; a body of mpm that is
-    /// coarser than the grid that others of mpm share), cancelled; nothing has changed then.
+    /// coarser than the grid that others of mpm share), cancelled; nothing has changed then. Where memory runs out on the way, the simulation may only be
+    /// destroyed.
     Result<std::size_t> add_body(const Actor& actor, const RunContext& context);
     /// A body is gone, with its pieces and with pins, forces, hands and attachments of it; what lay on it wakes. Its
     /// number is not given again. Errors: as check_body.
     Status remove_body(std::size_t body);
 
-    /// From now on an obstacle stands at `pose`, from the shape's own axes to the world, and goes on at `velocity` (m/s,
-    /// of its pivot_of) and `spin` (rad/s about that), until it is set again. What touches it feels this velocity. A
-    /// pose that is within a quarter of the finest body's spacing of where it stands is reached evenly in the next
-    /// frame; further it is a jump, which sweeps over nothing and pushes nothing but what it now lies in. Errors: usage
-    /// (no such obstacle; not finite, no turn and shift).
+    /// From now on an obstacle stands at `pose`, from the shape's own axes to the world, and goes on at `velocity`
+    /// (m/s, of its pivot_of) and `spin` (rad/s about that), until it is set again. What touches it feels this
+    /// velocity. A pose that is within a quarter of the finest body's spacing of where it stands is reached evenly in
+    /// the next frame; further it is a jump, which sweeps over nothing and pushes nothing but what it now lies in.
+    /// Errors: usage (no such obstacle; not finite, no turn and shift).
     Status set_obstacle(std::size_t obstacle, const Eigen::Isometry3d& pose, const Vec3d& velocity = Vec3d::Zero(),
                         const Vec3d& spin = Vec3d::Zero());
     /// In the next frame it goes to `pose` evenly, pushing what is in the way, and stands there. Errors: the same.
@@ -168,10 +169,10 @@ public:
     /// body that was removed all end with the next frame. None after restore.
     const std::vector<ContactEvent>& contact_events() const;
 
-    /// The first thing that a ray meets. direction: any length above 0. Bodies as they are now, by their surface at rest
-    /// that goes along with their cells, as contacts have it: meshes' details of less than half a spacing are not seen.
-    /// Bodies without a field (of mpm) by their particles, as balls. A ray that starts inside of something meets it at
-    /// once. Cost O(cells) of bodies whose box it meets. Nothing: it meets nothing, or is no ray.
+    /// The first thing that a ray meets. direction: any length above 0. Bodies as they are now, by their surface at
+    /// rest that goes along with their cells, as contacts have it: meshes' details of less than half a spacing are not
+    /// seen. Bodies without a field (of mpm) by their particles, as balls. A ray that starts inside of something meets
+    /// it at once. Cost O(cells) of bodies whose box it meets. Nothing: it meets nothing, or is no ray.
     std::optional<WorldHit> cast_ray(const Vec3d& origin, const Vec3d& direction, const RayOptions& options = {}) const;
 
     /// Whether a rigid body may sleep, from now on. No part of what save() keeps. Errors: as check_body.
@@ -189,7 +190,8 @@ public:
     /// Points that go along with a body: its driver, or all of a mesh. Positions on the body at rest, m.
     /// Returns a number for `attached`. Cost: as embed.
     std::size_t attach(std::size_t body, std::span<const Vec3f> points, const RunContext& context);
-    bool has_attachment(std::size_t attachment) const; ///< false once its body was removed; `attached` does nothing then
+    /// False once its body was removed; `attached` does nothing then.
+    bool has_attachment(std::size_t attachment) const;
     /// The same, each point with a piece, by the partition's number: what several pieces' copies of one point are
     /// carried by. Until the body breaks copies have the same bytes, and where pieces hold together also afterwards;
     /// then each goes with its own piece, also where that ends before it. Of a body that breaks; above, each point goes

@@ -1,7 +1,7 @@
 // A simulation's world changes between frames.
-#include "filigree/physics/step/ray_cast.h"
 #include "filigree/physics/rigid/rigid_body.h"
 #include "filigree/physics/simulation.h"
+#include "filigree/physics/step/ray_cast.h"
 #include "filigree/physics/step/run_time.h"
 
 #include <cmath>
@@ -56,8 +56,7 @@ Status Simulation::set_obstacle(std::size_t obstacle, const Eigen::Isometry3d& p
     const Obstacle& which = state_->world.obstacles[obstacle];
     const double now = time(), frame = state_->frame_seconds();
     const Eigen::Isometry3d stands = which.motion.at(now);
-    const bool is_jump =
-        way_between(stands, pose, state_->bodies) > kWithin * double(least_spacing(state_->bodies));
+    const bool is_jump = way_between(stands, pose, state_->bodies) > kWithin * double(least_spacing(state_->bodies));
     const Course course{.from = is_jump ? pose : stands,
                         .to = moved_on(pose, pivot_of(which), velocity, spin, frame),
                         .velocity = velocity,
@@ -106,7 +105,7 @@ Status Simulation::wake(std::size_t body) {
 }
 
 std::optional<WorldHit> Simulation::cast_ray(const Vec3d& origin, const Vec3d& direction,
-                                           const RayOptions& options) const {
+                                             const RayOptions& options) const {
     const double length = direction.norm();
     if (!origin.allFinite() || !(length > 0) || !std::isfinite(length) || !(options.reach > 0)) return std::nullopt;
     return filigree::cast_ray({origin, direction / length, options.reach}, *state_, options.ignore);

@@ -156,7 +156,7 @@ private:
     /// A surface point near an obstacle.
     struct Near {
         Index obstacle, point;
-        float depth = 0;    ///< m, now
+        float depth = 0; ///< m, now
         contact_law::Grasp grasp;
         Vec3f anchor = Vec3f::Zero();
         Vec3f rigid_force = Vec3f::Zero(); ///< N, on a rigid body: of the last substep

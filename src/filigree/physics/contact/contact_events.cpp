@@ -119,8 +119,7 @@ std::vector<ContactEvent> ContactEvents::touching(std::span<const BodyState> bod
     std::vector<ContactEvent> events;
     for (std::size_t k = 0; k < found.size(); ++k) {
         Sum sum = found[k].second;
-        while (k + 1 < found.size() && key_of(found[k + 1].first) == key_of(found[k].first))
-            sum.add(found[++k].second);
+        while (k + 1 < found.size() && key_of(found[k + 1].first) == key_of(found[k].first)) sum.add(found[++k].second);
         ContactEvent& event = events.emplace_back(found[k].first);
         event.place = sum.place / sum.weight;
         event.normal = sum.normal.stableNormalized();

@@ -29,8 +29,8 @@ public:
 
     /// Forces are found anew; those that were not kept are forgotten.
     void begin_forces();
-    /// A point touches with this force: impulse, N s along the normal in the substep; approach, m/s that it came nearer;
-    /// normal, unit, towards the body. Of different bodies from several threads.
+    /// A point touches with this force: impulse, N s along the normal in the substep; approach, m/s that it came
+    /// nearer; normal, unit, towards the body. Of different bodies from several threads.
     void touch(Index body, Touched other, const Vec3f& place, const Vec3f& normal, float impulse, float approach) {
         add(found_[body], other, place, normal, impulse, approach);
     }

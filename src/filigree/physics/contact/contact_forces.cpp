@@ -254,7 +254,8 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
         report.contacts += of_body.contacts;
         report.deepest = std::max(report.deepest, of_body.deepest);
     }
-    const ContactReport at_edges = features_.add_forces(bodies, shapes_, matter_, poses, dt, near_way_, touched_, events_);
+    const ContactReport at_edges =
+        features_.add_forces(bodies, shapes_, matter_, poses, dt, near_way_, touched_, events_);
     report.contacts += at_edges.contacts;
     report.deepest = std::max(report.deepest, at_edges.deepest);
     const ContactReport inside = matter_.add_forces(bodies, dt, touched_, rigid, events_, context);

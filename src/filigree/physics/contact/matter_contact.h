@@ -116,9 +116,9 @@ public:
     struct Pair {
         Index point = 0;
         Matter::Place place;
-        float clear_until = 0; ///< way of the side until which this cannot touch
-        float depth = 0;       ///< now
-        float approach = 0;    ///< m/s, along the normal, where it touches ...
+        float clear_until = 0;        ///< way of the side until which this cannot touch
+        float depth = 0;              ///< now
+        float approach = 0;           ///< m/s, along the normal, where it touches ...
         Vec3f normal = Vec3f::Zero(); ///< ... of the other there
         contact_law::Grasp grasp;
         Matter::Place anchor;

@@ -17,8 +17,8 @@ struct ContactPoint {
     float separation = 0;                 ///< m; below 0 is penetration
     Vec3f other_velocity = Vec3f::Zero(); ///< m/s, of an obstacle there
     float friction = 0, restitution = 0;
-    Vec3f* force = nullptr; ///< N, on the body: of the last substep, where the solver starts; then of this one
-    bool* holds = nullptr;  ///< whether it pushes
+    Vec3f* force = nullptr;          ///< N, on the body: of the last substep, where the solver starts; then of this one
+    bool* holds = nullptr;           ///< whether it pushes
     float impulse = 0, approach = 0; ///< after finish: N s along the normal; m/s that they came nearer before
 };
 

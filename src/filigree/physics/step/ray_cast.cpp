@@ -255,8 +255,8 @@ std::optional<WorldHit> meet_body(const SimulationState& state, std::size_t slot
         return std::nullopt;
     const Matter* matter = state.contacts.matter(slot);
     std::optional<WorldHit> hit = !matter      ? meet_particles(body, ray)
-                                : body.rigid ? meet_rigid(body, ray)
-                                             : SoftMatter(body, *matter).meet(ray);
+                                  : body.rigid ? meet_rigid(body, ray)
+                                               : SoftMatter(body, *matter).meet(ray);
     if (hit) hit->body = body.actor;
     return hit;
 }

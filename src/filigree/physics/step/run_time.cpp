@@ -38,8 +38,8 @@ Status add_to_grid(SimulationState& state, const Actor& actor) {
 }
 
 void note_start_overlaps(SimulationState& state, std::size_t actor, std::size_t slot) {
-    for (StartOverlap& overlap : find_start_overlaps(state.world, state.contacts.shapes(),
-                                                     std::span(&state.bodies[slot], 1), state.time())) {
+    for (StartOverlap& overlap :
+         find_start_overlaps(state.world, state.contacts.shapes(), std::span(&state.bodies[slot], 1), state.time())) {
         overlap.body = actor;
         state.start_overlaps.push_back(overlap);
     }

@@ -11,10 +11,10 @@ namespace filigree {
 /// Saved as it is.
 struct SetMotion {
     std::uint64_t obstacle = 0;
-    std::array<double, 12> pose = {};                      ///< at `begin`, from its own axes, column by column
-    double begin = 0, reached = 0;                         ///< s
-    Vec3d move = Vec3d::Zero(), angle = Vec3d::Zero();     ///< until `reached`: of its pivot, m; axis times radians
-    Vec3d velocity = Vec3d::Zero(), spin = Vec3d::Zero();  ///< afterwards, m/s and rad/s
+    std::array<double, 12> pose = {};                     ///< at `begin`, from its own axes, column by column
+    double begin = 0, reached = 0;                        ///< s
+    Vec3d move = Vec3d::Zero(), angle = Vec3d::Zero();    ///< until `reached`: of its pivot, m; axis times radians
+    Vec3d velocity = Vec3d::Zero(), spin = Vec3d::Zero(); ///< afterwards, m/s and rad/s
 };
 
 /// What a SetMotion is made of.

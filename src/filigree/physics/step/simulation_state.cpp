@@ -69,8 +69,9 @@ SavedState save_state(const SimulationState& state) {
 
 Status restore_state(SimulationState& state, SavedState saved) {
     const Error damaged{ErrorCode::bad_file, "The saved state is damaged; start the simulation anew."};
-    const Error other{ErrorCode::mismatch,
-                      "The saved state is of other bodies; resume it with the bodies that there were when it was saved."};
+    const Error other{
+        ErrorCode::mismatch,
+        "The saved state is of other bodies; resume it with the bodies that there were when it was saved."};
     if (saved.bodies.size() != state.bodies.size() || saved.cracks.size() != state.cracks.size()) return other;
     for (std::size_t c = 0; c < saved.cracks.size(); ++c)
         if (!state.cracks[c].set_memory(saved.cracks[c], state.bodies)) return damaged;

@@ -37,8 +37,8 @@ struct SimulationState {
     std::vector<std::uint64_t> made_of; ///< made_for.h; 0: it was removed
     std::vector<std::string> why_rigid; ///< Simulation::why_rigid
 
-    std::vector<RigidMotion> made_motions;                   ///< of each obstacle, as the world was made
-    std::vector<SetMotion> set_motions;                      ///< of those that were set since, ascending
+    std::vector<RigidMotion> made_motions; ///< of each obstacle, as the world was made
+    std::vector<SetMotion> set_motions;    ///< of those that were set since, ascending
     /// By body: itself, made rigid.
     std::map<std::weak_ptr<const Body>, std::weak_ptr<const Body>, std::owner_less<>> rigid_copies;
     std::optional<std::pair<std::size_t, Vec3f>> first_lost; ///< of this frame: actor and place (lost_particles.h)
@@ -46,8 +46,8 @@ struct SimulationState {
     std::vector<Cracks> cracks; ///< of bodies that break
     Contacts contacts;
     ExternalForces external;
-    std::unique_ptr<mpm::Bodies> grid; ///< of bodies of mpm; never null
-    std::vector<Attachment> attachments; ///< of slots; of bodies that were removed kNobody
+    std::unique_ptr<mpm::Bodies> grid;      ///< of bodies of mpm; never null
+    std::vector<Attachment> attachments;    ///< of slots; of bodies that were removed kNobody
     std::vector<std::size_t> first_tracers; ///< of each attachment: its points on the grid, where it is of such a body
     std::vector<std::vector<PieceFollower>> followers; ///< of each attachment; empty: its body does not break
     std::vector<std::vector<Vec3f>> pinned_from;       ///< of each pin: where its particles were at the start
@@ -58,7 +58,7 @@ struct SimulationState {
     bool has(std::size_t actor) const { return actor < slot_of.size() && slot_of[actor] != kNoIndex; }
     BodyState& body_of(std::size_t actor) { return bodies[slot_of[actor]]; }
     const BodyState& body_of(std::size_t actor) const; ///< of one that was removed: a free slot
-    const Cracks* cracks_of(std::size_t slot) const; ///< null: it does not break
+    const Cracks* cracks_of(std::size_t slot) const;   ///< null: it does not break
 };
 
 /// Steps by velocity Verlet. Returns the time reached: before `until` where something is not finite any more, or the
