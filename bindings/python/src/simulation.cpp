@@ -1,39 +1,16 @@
+#include "simulation.h"
+
+#include "calls.h"
 #include "models.h"
-#include "world.h"
 
 #include <filigree/physics/grid_limits.h>
 #include <filigree/physics/own_weight.h>
 
 #include <cstdio>
-#include <mutex>
 
 namespace filigree::python {
 
 namespace {
-
-/// One thread moves it at a time.
-struct PySimulation {
-    std::vector<PyBody> bodies;
-    Simulation simulation;
-    unsigned threads;
-    std::mutex mutex = {};
-
-    std::size_t checked(std::size_t body) const {
-        if (body >= bodies.size())
-            refuse("There is no body " + std::to_string(body) + "; there are " + std::to_string(bodies.size()) +
-                   ", counted from 0.");
-        return body;
-    }
-    /// work() without the interpreter, alone.
-    template <class Work>
-    auto alone(const Work& work) {
-        return without_interpreter([&] {
-            const std::lock_guard lock(mutex);
-            return work();
-        });
-    }
-};
-using SimulationPtr = std::shared_ptr<PySimulation>;
 
 /// Points that go along, and where they count from: of a driver model units and its mesh's origin.
 struct Attachment {
@@ -42,10 +19,15 @@ struct Attachment {
     double scale = 1;             ///< metres a unit
     Vec3d origin = Vec3d::Zero(); ///< m
 
+    void require() const {
+        if (!simulation->simulation.has_attachment(number))
+            refuse("The body that these points went along with was removed.");
+    }
     Pose pose() const {
         Pose pose{std::vector<Vec3f>(count), std::vector<Mat3f>(count), {}};
         const RunContext& context = short_context(simulation->threads);
         simulation->alone([&] {
+            require();
             simulation->simulation.attached(number, pose.positions, pose.gradients, context);
             return Success{};
         });
@@ -57,6 +39,18 @@ struct Attachment {
     }
 };
 
+} // namespace
+
+PyActor actor_of(const py::handle& given, const char* what) {
+    if (py::isinstance<PyActor>(given)) return given.cast<PyActor>();
+    if (!py::isinstance<PyBody>(given))
+        throw py::type_error(std::string(what) + " to hold filigree.Body or filigree.Actor.");
+    return make_actor(given.cast<PyBody>(), py::make_tuple(0, 0, 0), py::make_tuple(0, 1, 0), 0,
+                      py::make_tuple(0, 0, 0), py::none(), py::none(), true);
+}
+
+namespace {
+
 SimulationPtr make_simulation(const py::object& bodies, const py::object& gravity,
                               const std::vector<Obstacle>& obstacles, const std::vector<Pin>& pins,
                               const std::vector<RegionForce>& forces, const std::vector<Hand>& hands,
@@ -65,16 +59,11 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
                               double restitution, double frames_per_second, const std::string& mode,
                               unsigned most_substeps, bool contacts_between_bodies, bool contacts_within_bodies,
                               bool automatic_rigid, unsigned threads) {
-    std::vector<PyBody> held;
+    std::vector<std::optional<PyBody>> held;
     std::vector<Actor> actors;
     for (const py::handle given : py::list(bodies)) {
-        if (!py::isinstance<PyActor>(given) && !py::isinstance<PyBody>(given))
-            throw py::type_error("bodies has to hold filigree.Body or filigree.Actor.");
-        const PyActor actor = py::isinstance<PyActor>(given)
-                                  ? given.cast<PyActor>()
-                                  : make_actor(given.cast<PyBody>(), py::make_tuple(0, 0, 0), py::make_tuple(0, 1, 0),
-                                               0, py::make_tuple(0, 0, 0), py::none(), py::none(), true);
-        held.push_back(actor.body);
+        const PyActor actor = actor_of(given, "bodies has");
+        held.emplace_back(actor.body);
         actors.push_back(actor.actor);
     }
     World world;
@@ -190,7 +179,7 @@ py::dict inverted(PySimulation& self, std::size_t body) {
 
 Attachment attach(const SimulationPtr& self, std::size_t body, const py::object& what) {
     self->checked(body);
-    const PyBody& of = self->bodies[body];
+    const PyBody of = self->alone([&] { return self->bodies[body].value(); });
     Attachment made{self, 0, 0};
     std::vector<Vec3f> points;
     if (py::isinstance<PyModel>(what)) {
@@ -222,6 +211,7 @@ Where they are now, with gradients from rest to there: a Pose, of a driver in mo
             [](const Attachment& self) {
                 std::vector<float> renewal(self.count);
                 self.simulation->alone([&] {
+                    self.require();
                     self.simulation->simulation.renewal(self.number, renewal);
                     return Success{};
                 });
@@ -235,7 +225,7 @@ that are not of 'mpm' 0.
 )")
         .def("__len__", [](const Attachment& self) { return self.count; });
 
-    py::class_<PySimulation, SimulationPtr>(
+    py::class_<PySimulation, SimulationPtr> simulation(
         m, "Simulation",
         R"(Bodies in a world, moved frame by frame. SI units. The same bytes for any number of threads.
 
@@ -281,7 +271,8 @@ Examples
 ...     report = simulation.step()
 >>> filigree.restore(model, driver.pose())
 <filigree.Mesh: 1538 vertices, 1536 faces>
-)")
+)");
+    simulation
         .def(
             py::init(&make_simulation), py::arg("bodies"), py::kw_only(),
             py::arg("gravity") = py::make_tuple(0, -9.81, 0), py::arg("obstacles") = py::tuple(),
@@ -327,10 +318,14 @@ dict
             "time", [](PySimulation& self) { return self.alone([&] { return self.simulation.time(); }); },
             "Seconds done.")
         .def_property_readonly(
-            "bodies", [](const PySimulation& self) { return self.bodies; }, "A list of Body.")
+            "bodies", [](PySimulation& self) { return self.alone([&] { return self.bodies; }); },
+            "A list of Body, by number; None of one that was removed.")
         .def(
             "why_rigid",
-            [](const PySimulation& self, std::size_t body) { return self.simulation.why_rigid(self.checked(body)); },
+            [](PySimulation& self, std::size_t body) {
+                self.checked(body);
+                return self.alone([&] { return self.simulation.why_rigid(body); });
+            },
             py::arg("body"), R"(why_rigid(self, body)
 --
 
@@ -524,8 +519,8 @@ Linear, kg m/s, and angular about the world's origin, kg m^2/s: two arrays of fl
             R"(save(self)
 --
 
-Everything that moves, as bytes. Hands and forces that were set are no part of it. It goes on only with the bodies, the
-world and the options that it was saved with.
+Everything that moves, as bytes; obstacles that were set, too. Hands and forces that were set are no part of it. It goes
+on only with the bodies, the world and the options that it was saved with: the same bodies have to have come and gone.
 )")
         .def(
             "restore",
@@ -543,8 +538,9 @@ Raises
 BadFileError
     Damaged.
 MismatchError
-    Of other bodies.
+    Of other bodies: also where some were added or removed since.
 )");
+    add_changes(simulation);
 }
 
 } // namespace filigree::python

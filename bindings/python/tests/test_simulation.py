@@ -351,3 +351,146 @@ def test_a_mode_that_is_gone_is_told(body):
         filigree.Simulation([body], mode="descent")
     with pytest.raises(filigree.UsageError, match="mode"):
         filigree.Simulation([body], mode="implicit")
+
+
+STONE = filigree.Material("stone")
+
+
+def crate(size=0.2):
+    return filigree.Body(filigree.make("wavy-cube", resolution=8), STONE, particles=64, size=size)
+
+
+def test_bodies_come_and_go(body):
+    floor = filigree.Obstacle.plane((0, 0, 0))
+    simulation = filigree.Simulation([crate()], obstacles=[floor], gravity=(0, -9.81, 0))
+    assert simulation.add_body(filigree.Actor(crate(), move=(2, 1, 0), velocity=(0, 0, 1))) == 1
+    assert simulation.add_body(body) == 2
+    simulation.step(10)
+    assert len(simulation.bodies) == 3 and simulation.bodies[1].mass.sum() > 0
+    points = simulation.attach(1, [[0, 0, 0]])
+    simulation.remove_body(1)
+    assert simulation.bodies[1] is None
+    assert not simulation.has_body(1) and simulation.has_body(2) and not simulation.has_body(7)
+    for ask in (
+        lambda: simulation.positions(1),
+        lambda: simulation.velocities(1),
+        lambda: simulation.set_positions(1, [[0, 0, 0]]),
+        lambda: simulation.set_forces(1, None),
+        lambda: simulation.inverted(1),
+        lambda: simulation.matter(1),
+        lambda: simulation.attach(1, [[0, 0, 0]]),
+        lambda: simulation.why_rigid(1),
+        lambda: simulation.is_asleep(1),
+        lambda: simulation.wake(1),
+        lambda: simulation.remove_body(1),
+        lambda: simulation.set_hands([filigree.Hand(1, (0, 0, 0), (1, 1, 1))]),
+    ):
+        with pytest.raises(filigree.UsageError, match="Body 1 was removed"):
+            ask()
+    with pytest.raises(filigree.UsageError, match="body that these points went along with was removed"):
+        points.pose()
+    with pytest.raises(filigree.UsageError, match="There is no body 9; there are 3, counted from 0"):
+        simulation.remove_body(9)
+    assert simulation.add_body(crate()) == 3
+    simulation.step(5)
+    with pytest.raises(TypeError, match="Body or filigree.Actor"):
+        simulation.add_body("stone")
+
+
+def test_a_body_that_comes_is_as_one_that_was_there(body):
+    floor = filigree.Obstacle.plane((0, -1, 0))
+    later = filigree.Actor(body, move=(0.1, 1.5, 0))
+    whole = filigree.Simulation([body, later], obstacles=[floor])
+    grown = filigree.Simulation([body], obstacles=[floor], threads=2)
+    grown.add_body(later)
+    whole.step(20)
+    grown.step(20)
+    assert same(whole.positions(1), grown.positions(1))
+    other = filigree.Simulation([body], obstacles=[floor])
+    with pytest.raises(filigree.MismatchError, match="some were added or removed"):
+        other.restore(grown.save())
+
+
+def test_a_body_that_comes_is_told_of():
+    simulation = filigree.Simulation([crate()], obstacles=[filigree.Obstacle.plane((0, -2, 0))])
+    soft = filigree.Body(filigree.make("wavy-cube", resolution=8), "jelly", particles=500, size=8.0)
+    _, said = said_by(lambda: simulation.add_body(soft))
+    assert any("Body 1 " in sentence for sentence in said)
+    assert any("body 1 starts up to" in sentence for sentence in said)
+
+
+def test_obstacles_are_set_and_moved():
+    table = filigree.Obstacle.box((0, -0.1, 0), (2, 0.2, 2), friction=1)
+    simulation = filigree.Simulation([filigree.Actor(crate(), move=(0, 0.1, 0))], obstacles=[table])
+    simulation.step(20)
+    start = simulation.positions(0).mean(0)
+    for frame in range(30):
+        simulation.move_obstacle(0, move=((frame + 1) / 60, 0, 0))
+        simulation.step()
+    assert simulation.positions(0).mean(0)[0] - start[0] == pytest.approx(0.5, abs=0.05)
+    assert simulation.obstacle_pose(0)[:3, 3] == pytest.approx([0.5, 0, 0])
+    simulation.set_obstacle(0, move=(0, -3, 0), axis=(0, 0, 1), degrees=30, spin_degrees=(0, 0, 60))
+    pose = simulation.obstacle_pose(0)
+    assert pose @ [0, -0.1, 0, 1] == pytest.approx([0, -3.1, 0, 1])
+    simulation.step(30)
+    turned = simulation.obstacle_pose(0)
+    assert turned @ [0, -0.1, 0, 1] == pytest.approx([0, -3.1, 0, 1])
+    assert numpy.degrees(numpy.arctan2(turned[1, 0], turned[0, 0])) == pytest.approx(60)
+    simulation.set_obstacle(0, matrix=pose)
+    assert simulation.obstacle_pose(0) == pytest.approx(pose)
+    with pytest.raises(filigree.UsageError, match="There is no obstacle 1"):
+        simulation.set_obstacle(1)
+    with pytest.raises(filigree.UsageError, match="There is no obstacle 1"):
+        simulation.obstacle_pose(1)
+    with pytest.raises(filigree.UsageError, match=r"shape \(4, 4\)"):
+        simulation.set_obstacle(0, matrix=[[1, 0], [0, 1]])
+    with pytest.raises(filigree.UsageError, match="pose must be a turn and a shift"):
+        simulation.move_obstacle(0, matrix=numpy.diag([2.0, 1, 1, 1]))
+
+
+def test_contact_events_say_how_hard():
+    floor = filigree.Obstacle.plane((0, 0, 0))
+    falls = filigree.Actor(crate(), move=(0, 0.15, 0), velocity=(0, -3, 0))
+    simulation = filigree.Simulation([falls], obstacles=[floor])
+    mass = simulation.bodies[0].mass.sum()
+    kinds, impulse = [], 0
+    for _ in range(20):
+        simulation.step()
+        for event in simulation.contact_events():
+            assert event["body"] == 0 and event["obstacle"] == 0 and event["other"] is None
+            assert event["normal"] == pytest.approx([0, 1, 0], abs=1e-3)
+            if event["kind"] == "began" and not kinds:
+                assert event["speed"] == pytest.approx(3.1, abs=0.3)
+                assert event["place"][1] == pytest.approx(0, abs=0.03)
+            kinds.append(event["kind"])
+            impulse += event["impulse"]
+    assert kinds[0] == "began" and "ended" in kinds
+    gained = simulation.momentum()[0][1] + 3 * mass + mass * 9.81 * 20 / 60
+    assert impulse == pytest.approx(gained, rel=0.03)
+
+
+def test_rays_meet_what_is_first(body):
+    floor = filigree.Obstacle.plane((0, -1, 0))
+    simulation = filigree.Simulation([body], obstacles=[floor])
+    hit = simulation.cast_ray((0, 3, 0), (0, -2, 0))
+    assert hit["body"] == 0 and hit["obstacle"] is None
+    assert hit["place"] == pytest.approx(hit["rest"], abs=1e-3)
+    assert hit["distance"] == pytest.approx(3 - hit["place"][1])
+    assert hit["normal"][1] > 0.7
+    below = simulation.cast_ray((0, 3, 0), (0, -1, 0), ignore=0)
+    assert below["body"] is None and below["obstacle"] == 0 and below["rest"] is None
+    assert below["distance"] == pytest.approx(4)
+    assert simulation.cast_ray((0, 3, 0), (0, -1, 0), reach=1) is None
+    assert simulation.cast_ray((0, 3, 0), (0, 1, 0)) is None
+    with pytest.raises(filigree.UsageError, match="direction has no length"):
+        simulation.cast_ray((0, 0, 0), (0, 0, 0))
+
+
+def test_sleep_is_switched():
+    floor = filigree.Obstacle.plane((0, -0.1, 0))
+    simulation = filigree.Simulation([crate(), filigree.Actor(crate(), move=(1, 0, 0))], obstacles=[floor])
+    simulation.set_may_sleep(1, False)
+    simulation.step(150)
+    assert simulation.is_asleep(0) and not simulation.is_asleep(1)
+    simulation.wake(0)
+    assert not simulation.is_asleep(0)

@@ -1,18 +1,16 @@
 #include "filigree/physics/simulation.h"
 
-#include "filigree/core/text.h"
 #include "filigree/physics/rigid/rigid_body.h"
 #include "filigree/physics/rigid/rigid_state.h"
 #include "filigree/physics/rigid/sleep.h"
+#include "filigree/physics/step/begin_bodies.h"
 #include "filigree/physics/step/inverted_cells.h"
 #include "filigree/physics/step/lost_particles.h"
 #include "filigree/physics/step/simulation_state.h"
-#include "filigree/physics/step/stiff_hits.h"
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <map>
 
 namespace filigree {
 
@@ -27,139 +25,21 @@ Status check_options(const StepOptions& options) {
     return Success{};
 }
 
-/// Everything that is the same for a body whether it is stepped by itself or on the grid.
-BodyState place_body(const Actor& actor, std::size_t number) {
-    BodyState state;
-    state.body = actor.body;
-    state.actor = number;
-    state.placement = actor.placement;
-    state.may_sleep = actor.may_sleep;
-    const Body& body = *actor.body;
-    const std::size_t count = body.particle_count();
-    state.positions = state.velocities = Vectors(count);
-    for (std::size_t i = 0; i < count; ++i)
-        state.positions.set(i, (actor.placement * body.rest[i].cast<double>()).cast<float>());
-    const Vec3d centre = rigid_state(state).centre;
-    for (std::size_t i = 0; i < count; ++i)
-        state.velocities.set(
-            i, (actor.velocity + actor.spin.cross(state.positions[i].cast<double>() - centre)).cast<float>());
-    return state;
-}
-
-BodyState begin_body(const Actor& actor, std::size_t number, const RunContext& context) {
-    BodyState state = place_body(actor, number);
-    const Body& body = *actor.body;
-    const std::size_t count = body.particle_count();
-    state.elasticity = make_elasticity(body, context);
-    state.forces = Vectors(count);
-    state.rest_squared_frequency = state.elasticity->forces(body.rest, state.forces, context).squared_frequency;
-    state.fixed.assign(count, 0);
-    state.inverse_mass.resize(count);
-    for (std::size_t i = 0; i < count; ++i) state.inverse_mass[i] = 1 / body.mass[i];
-
-    if (body.material.model == MaterialModel::rigid) {
-        fit_pose(state);
-        state.rest_squared_frequency = kRigidSquaredFrequency;
-        state.surface_stiffness = rigid_surface_stiffness(state);
+/// All actors come first, then the pieces of those that break.
+void begin_bodies(SimulationState& state, std::span<const Actor> actors, const RunContext& context) {
+    std::vector<BodyState> bodies;
+    for (std::size_t a = 0; a < actors.size(); ++a) {
+        Beginning begun = begin_actor(state, actors[a], a, context);
+        bodies.push_back(std::move(begun.body));
+        state.why_rigid.push_back(std::move(begun.why_rigid));
+        state.slot_of.push_back(Index(a));
     }
-    state.surface = body.surface.points;
-    if (body.corners.size() != 0) state.corners.emplace(body.corners, count);
-    if (!state.rigid) set_surface_stiffness(state);
-    state.is_stiff = is_stiff(body.material) && !actor.fracture;
-    return state;
-}
-
-BodyState begin_on_grid(SimulationState& state, const Actor& actor, std::size_t number) {
-    BodyState body = place_body(actor, number);
-    body.is_on_grid = body.is_absent = true;
-    body.fixed.assign(body.positions.size(), 0);
-    body.inverse_mass.assign(body.positions.size(), 0);
-    body.forces = Vectors(body.positions.size());
-    body.rest_squared_frequency = state.grid->rest_squared_frequency(number);
-    state.grid->set_positions(number, body.positions);
-    state.grid->set_velocities(number, body.velocities);
-    Mat3f turning;
-    turning << 0, -float(actor.spin.z()), float(actor.spin.y()), float(actor.spin.z()), 0, -float(actor.spin.x()),
-        -float(actor.spin.y()), float(actor.spin.x()), 0;
-    state.grid->set_velocity_gradient(number, turning);
-    return body;
-}
-
-/// Bodies that are too small or too stiff for explicit steps are made rigid; those of one kind go on sharing theirs.
-class AutomaticRigid {
-public:
-    AutomaticRigid(const World& world, const StepOptions& options, std::span<const Actor> actors)
-        : options_(options), may_be_rigid_(actors.size(), options.automatic_rigid ? 1 : 0) {
-        for (const Pin& pin : world.pins) may_be_rigid_[pin.body] = 0;
-        for (std::size_t a = 0; a < actors.size(); ++a)
-            if (actors[a].fracture) may_be_rigid_[a] = 0;
-    }
-
-    /// "": it stays as it is.
-    std::string reason(std::size_t number, const BodyState& state) const {
-        const Body& body = *state.body;
-        const MaterialModel model = body.material.model;
-        if (!may_be_rigid_[number] || body.material.is_plastic() ||
-            (model != MaterialModel::fem && model != MaterialModel::springs))
-            return "";
-        if (const std::size_t cells = body.cells.cells.size(); cells < kFewestElasticCells)
-            return "it has only " + std::to_string(cells) + (cells == 1 ? " cell" : " cells");
-        const double substeps = substeps_at_rest(state);
-        if (options_.mode != StepMode::automatic || substeps <= options_.most_substeps) return "";
-        return "elastic, it would need " + with_commas(std::uint64_t(substeps)) + " substeps a frame";
-    }
-    std::shared_ptr<const Body> rigid(const std::shared_ptr<const Body>& body) {
-        std::shared_ptr<const Body>& found = made_[body];
-        if (!found) found = std::make_shared<const Body>(as_rigid(*body));
-        return found;
-    }
-
-private:
-    double substeps_at_rest(const BodyState& state) const {
-        return std::sqrt(double(state.rest_squared_frequency)) / (2 * options_.frames_per_second);
-    }
-
-    const StepOptions& options_;
-    std::vector<std::uint8_t> may_be_rigid_;
-    std::map<std::shared_ptr<const Body>, std::shared_ptr<const Body>> made_;
-};
-
-/// Whether particles are corners of cells that deform.
-bool has_cells(MaterialModel model) { return model == MaterialModel::fem || model == MaterialModel::springs; }
-
-void begin_bodies(SimulationState& state, std::vector<Actor>& actors, const RunContext& context) {
-    AutomaticRigid automatic(state.world, state.options, actors);
-    for (Actor& actor : actors) {
-        const std::size_t number = state.bodies.size();
-        if (state.grid->has(number)) {
-            state.bodies.push_back(begin_on_grid(state, actor, number));
-            state.why_rigid.emplace_back();
-            continue;
-        }
-        BodyState body = begin_body(actor, number, context);
-        state.why_rigid.push_back(automatic.reason(number, body));
-        if (!state.why_rigid.back().empty()) {
-            actor.body = automatic.rigid(actor.body);
-            body = begin_body(actor, number, context);
-        }
-        if (has_cells(body.body->material.model)) find_light_corners(body);
-        state.bodies.push_back(std::move(body));
-    }
-}
-
-/// Bodies for the pieces of those that break; they wait.
-void begin_pieces(SimulationState& state, std::span<const Actor> actors, const RunContext& context) {
+    take_slots(state, 0, std::move(bodies));
     for (std::size_t a = 0; a < actors.size(); ++a) {
         if (!actors[a].fracture) continue;
-        const std::size_t first = state.bodies.size();
-        state.bodies[a].broken = actors[a].fracture->body;
-        state.bodies[a].first_piece = first;
-        for (const std::shared_ptr<const Body>& piece : actors[a].fracture->body->pieces) {
-            state.bodies.push_back(begin_body({piece, actors[a].placement}, a, context));
-            state.bodies.back().is_absent = true;
-            find_light_corners(state.bodies.back());
-        }
-        state.cracks.emplace_back(actors[a].fracture, a, first);
+        const std::size_t first_piece = state.bodies.size();
+        take_slots(state, first_piece, begin_pieces(actors[a], a, context));
+        let_break(state, actors[a], a, first_piece);
     }
 }
 
@@ -190,6 +70,7 @@ void begin_pins(SimulationState& state) {
 std::vector<Grip> make_grips(std::span<const Hand> hands, const SimulationState& state, const RunContext& context) {
     std::vector<Grip> grips;
     for (Hand hand : hands) {
+        hand.body = state.slot_of[hand.body];
         const BodyState& body = state.bodies[hand.body];
         grips.push_back(make_grip(hand, body, context));
         if (!body.broken) continue; // else it holds on to the piece that its point is of
@@ -237,6 +118,7 @@ Result<FrameReport> step_frame(SimulationState& state, const RunContext& context
     const double from = state.time(), until = double(state.frame + 1) * state.frame_seconds();
     FrameReport report;
     state.contacts.clear_touches();
+    state.contacts.events().begin_frame();
     state.external.find_wind(state.bodies, from, state.options.frames_per_second, context);
     std::size_t held = step_bodies(state, from, until, report, context);
     if (context.is_cancelled()) return cancelled_error();
@@ -245,10 +127,12 @@ Result<FrameReport> step_frame(SimulationState& state, const RunContext& context
     held += hold_lost_particles(state);
     report.clamped_particles += held;
     tell_first_lost(state, report);
-    report.most_crushed = state.bodies[report.most_crushed].actor;
+    const BodyState& crushed = state.bodies[report.most_crushed];
+    report.most_crushed = crushed.is_free() ? 0 : crushed.actor; // nothing was
     note_flow(state, report);
     for (const Cracks& cracks : state.cracks) cracks.show_whole(state.bodies);
     let_rest(state, from, until);
+    state.contacts.events().end_frame(state.bodies);
     ++state.frame;
     return report;
 }
@@ -294,11 +178,11 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
     std::size_t count = actors.size();
     for (const Actor& actor : actors)
         if (actor.fracture) count += actor.fracture->body->pieces.size();
-    const MadeFor made = made_for(world, actors, options);
-    auto state = std::make_unique<SimulationState>(std::move(world), count, actors.size(), options, made);
+    auto state = std::make_unique<SimulationState>(std::move(world), count, actors.size(), options);
+    for (const Actor& actor : actors) state->made_of.push_back(made_of(actor));
     state->grid = std::make_unique<mpm::Bodies>(state->world, actors);
     begin_bodies(*state, actors, context);
-    begin_pieces(*state, actors, context);
+    state->made_for.bodies = made_of_all(state->slot_of, state->made_of);
     for (const RegionForce& force : state->world.forces)
         for (BodyState& body : state->bodies)
             if (body.actor == force.body) body.is_held = true;
@@ -310,7 +194,7 @@ Result<Simulation> Simulation::create(World world, std::vector<Actor> actors, co
         if (!cracks.set_memory(cracks.memory(), state->bodies)) assert(false); // works out what follows from it
     place_corners(state->bodies, context);
     state->contacts.begin(state->bodies);
-    state->start_overlaps = find_start_overlaps(state->world, state->bodies);
+    state->start_overlaps = find_start_overlaps(state->world, state->contacts.shapes(), state->bodies);
     return Simulation(std::move(state));
 }
 
@@ -325,11 +209,11 @@ Result<FrameReport> Simulation::advance(const RunContext& context) {
 std::size_t Simulation::frame() const { return state_->frame; }
 double Simulation::time() const { return state_->time(); }
 const World& Simulation::world() const { return state_->world; }
-std::size_t Simulation::body_count() const { return state_->actor_count; }
+std::size_t Simulation::body_count() const { return state_->slot_of.size(); }
 
 const Body& Simulation::body(std::size_t body) const {
     assert(body < body_count());
-    return *state_->bodies[body].body;
+    return *std::as_const(*state_).body_of(body).body;
 }
 const std::vector<StartOverlap>& Simulation::start_overlaps() const { return state_->start_overlaps; }
 const std::string& Simulation::why_rigid(std::size_t body) const {
@@ -338,34 +222,34 @@ const std::string& Simulation::why_rigid(std::size_t body) const {
 }
 const Vectors& Simulation::positions(std::size_t body) const {
     assert(body < body_count());
-    return state_->bodies[body].positions;
+    return std::as_const(*state_).body_of(body).positions;
 }
 const Vectors& Simulation::velocities(std::size_t body) const {
     assert(body < body_count());
-    return state_->bodies[body].velocities;
+    return std::as_const(*state_).body_of(body).velocities;
 }
 
 Status Simulation::set_positions(std::size_t body, const Vectors& positions) {
     if (Status checked = check_vectors(body, positions, "positions"); !checked) return checked;
-    state_->bodies[body].positions = positions;
-    fit_rigid(*state_, state_->bodies[body]);
-    if (state_->bodies[body].is_on_grid) state_->grid->set_positions(body, positions);
-    state_->contacts.was_placed(body);
+    BodyState& state = state_->body_of(body);
+    state.positions = positions;
+    fit_rigid(*state_, state);
+    if (state.is_on_grid) state_->grid->set_positions(body, positions);
+    state_->contacts.was_placed(state_->slot_of[body]);
     state_->contacts.begin_anew();
     return Success{};
 }
 Status Simulation::set_velocities(std::size_t body, const Vectors& velocities) {
     if (Status checked = check_vectors(body, velocities, "velocities"); !checked) return checked;
-    state_->bodies[body].velocities = velocities;
-    fit_rigid(*state_, state_->bodies[body]);
-    if (state_->bodies[body].is_on_grid) state_->grid->set_velocities(body, velocities);
+    BodyState& state = state_->body_of(body);
+    state.velocities = velocities;
+    fit_rigid(*state_, state);
+    if (state.is_on_grid) state_->grid->set_velocities(body, velocities);
     return Success{};
 }
 Status Simulation::check_count(std::size_t body, const Vectors& vectors, const char* what) const {
-    if (body >= body_count())
-        return usage("There is no body " + std::to_string(body) + "; there are " + std::to_string(body_count()) +
-                     ", counted from 0.");
-    const std::size_t count = state_->bodies[body].positions.size();
+    if (Status checked = check_body(body); !checked) return checked;
+    const std::size_t count = state_->body_of(body).positions.size();
     if (vectors.size() != count)
         return usage("Body " + std::to_string(body) + " has " + std::to_string(count) + " particles and was given " +
                      std::to_string(vectors.size()) + " " + what + ".");
@@ -373,13 +257,15 @@ Status Simulation::check_count(std::size_t body, const Vectors& vectors, const c
 }
 Status Simulation::check_vectors(std::size_t body, const Vectors& vectors, const char* what) const {
     if (Status checked = check_count(body, vectors, what); !checked) return checked;
-    if (state_->bodies[body].is_absent && !state_->bodies[body].is_on_grid)
+    if (state_->body_of(body).is_absent && !state_->body_of(body).is_on_grid)
         return usage("Body " + std::to_string(body) + " has broken.");
     return Success{};
 }
 
 Status Simulation::set_hands(std::vector<Hand> hands, const RunContext& context) {
     if (Status checked = check_hands(hands, body_count()); !checked) return checked;
+    for (const Hand& hand : hands)
+        if (Status checked = check_body(hand.body); !checked) return checked;
     for (const Cracks& cracks : state_->cracks)
         if (!cracks.is_open()) cracks.follow_whole(state_->bodies);
     state_->external.set_grips(make_grips(hands, *state_, context));
@@ -388,13 +274,13 @@ Status Simulation::set_hands(std::vector<Hand> hands, const RunContext& context)
 }
 
 Status Simulation::set_forces(std::size_t body, const Vectors& newtons) {
-    if (newtons.size() > 0 || body >= body_count())
-        if (Status checked = check_count(body, newtons, "forces"); !checked) return checked;
+    if (Status checked = newtons.size() > 0 ? check_count(body, newtons, "forces") : check_body(body); !checked)
+        return checked;
     for (std::size_t i = 0; i < newtons.size(); ++i)
         if (!newtons[i].allFinite())
             return usage("The force on particle " + std::to_string(i) + " of body " + std::to_string(body) +
                          " is not finite.");
-    state_->external.set_pushes(body, newtons);
+    state_->external.set_pushes(state_->slot_of[body], newtons);
     return Success{};
 }
 
@@ -445,13 +331,13 @@ InvertedCells Simulation::inverted(std::size_t body) const {
 
 FractureReport Simulation::fracture(std::size_t body) const {
     assert(body < body_count());
-    const Cracks* cracks = state_->cracks_of(body);
+    const Cracks* cracks = has_body(body) ? state_->cracks_of(state_->slot_of[body]) : nullptr;
     return cracks ? cracks->report() : FractureReport{};
 }
 
 std::size_t Simulation::attach(std::size_t body, std::span<const Vec3f> points, const RunContext& context) {
     assert(body < body_count());
-    const BodyState& state = state_->bodies[body];
+    const BodyState& state = std::as_const(*state_).body_of(body);
     std::vector<Index> numbers;
     if (state.broken)
         for (const Vec3f& point : points) numbers.push_back(state.broken->partition.piece_at(point.cast<double>()));
@@ -460,13 +346,13 @@ std::size_t Simulation::attach(std::size_t body, std::span<const Vec3f> points, 
 
 /// Points go on from where the particles that were around them at rest have them now.
 std::size_t Simulation::attach_on_grid(std::size_t body, std::span<const Vec3f> points, const RunContext& context) {
-    const BodyState& state = state_->bodies[body];
+    const BodyState& state = state_->body_of(body);
     const Embedding around = embed(points, state.body->rest, state.body->spacing(), context);
     std::vector<Vec3f> places(points.size());
     std::vector<Mat3f> gradients(points.size());
     fit_embedded(around, state.body->rest, state.positions, places, gradients, context);
     state_->first_tracers.push_back(state_->grid->add_tracers(body, places, gradients));
-    state_->attachments.push_back({body, {points.begin(), points.end()}, {}});
+    state_->attachments.push_back({state_->slot_of[body], {points.begin(), points.end()}, {}});
     state_->followers.emplace_back();
     return state_->attachments.size() - 1;
 }
@@ -474,9 +360,10 @@ std::size_t Simulation::attach_on_grid(std::size_t body, std::span<const Vec3f> 
 std::size_t Simulation::attach(std::size_t body, std::span<const Vec3f> points, std::span<const Index> pieces,
                                const RunContext& context) {
     assert(body < body_count());
-    const BodyState& state = state_->bodies[body];
+    const BodyState& state = std::as_const(*state_).body_of(body);
     if (state.is_on_grid) return attach_on_grid(body, points, context);
-    state_->attachments.push_back(filigree::attach(state, body, points, context));
+    state_->attachments.push_back(has_body(body) ? filigree::attach(state, state_->slot_of[body], points, context)
+                                                 : Attachment{BodyState::kNobody, {}, {}});
     state_->first_tracers.push_back(0);
     std::vector<PieceFollower>& followers = state_->followers.emplace_back();
     if (state.broken) {
@@ -494,7 +381,7 @@ std::size_t Simulation::attach(std::size_t body, std::span<const Vec3f> points, 
 
 void Simulation::renewal(std::size_t attachment, std::span<float> renewal) const {
     assert(attachment < state_->attachments.size());
-    if (state_->bodies[state_->attachments[attachment].body].is_on_grid)
+    if (has_attachment(attachment) && state_->bodies[state_->attachments[attachment].body].is_on_grid)
         state_->grid->read_renewal(state_->first_tracers[attachment], renewal);
     else
         std::ranges::fill(renewal, 0.0f);
@@ -502,13 +389,14 @@ void Simulation::renewal(std::size_t attachment, std::span<float> renewal) const
 
 MatterParticles Simulation::matter(std::size_t body) const {
     assert(body < body_count());
-    return state_->bodies[body].is_on_grid ? state_->grid->matter(body) : MatterParticles{};
+    return std::as_const(*state_).body_of(body).is_on_grid ? state_->grid->matter(body) : MatterParticles{};
 }
 double Simulation::heat() const { return state_->grid->heat(); }
 
 void Simulation::attached(std::size_t attachment, std::span<Vec3f> points, std::span<Mat3f> gradients,
                           const RunContext& context) const {
     assert(attachment < state_->attachments.size());
+    if (!has_attachment(attachment)) return;
     const Attachment& which = state_->attachments[attachment];
     const BodyState& body = state_->bodies[which.body];
     if (body.is_on_grid)
@@ -531,7 +419,9 @@ Status Simulation::restore(std::string_view bytes) {
     if (!restored) {
         [[maybe_unused]] const Status undone = restore_state(*state_, std::move(before));
         assert(undone.ok());
+        return restored;
     }
+    state_->contacts.events().forget_frame();
     return restored;
 }
 

@@ -2,9 +2,11 @@
 #pragma once
 
 #include "filigree/physics/body.h"
+#include "filigree/physics/contact_event.h"
 #include "filigree/physics/fracture.h"
 #include "filigree/physics/matter_particles.h"
 #include "filigree/physics/world.h"
+#include "filigree/physics/world_hit.h"
 
 namespace filigree {
 
@@ -73,6 +75,9 @@ struct Momentum {
 /// more." Everything is checked: that there are bodies with particles, that what is named is there, that numbers are
 /// finite and in their ranges, that keys ascend. Cost O(keys and particles named).
 Status check_world(const World& world, std::span<const Actor> actors);
+/// The same for a body that is added ("actor.body is missing."), and for how an obstacle is set.
+Status check_actor(const Actor& actor);
+Status check_obstacle_motion(const Eigen::Isometry3d& pose, const Vec3d& velocity, const Vec3d& spin);
 /// The same for hands that pull some of so many bodies, for the air and for heat sources.
 Status check_hands(std::span<const Hand> hands, std::size_t body_count);
 Status check_air(const Keyed<double>& temperature, double heat_transfer);
@@ -90,8 +95,8 @@ struct StartOverlap {
 struct SimulationState;
 
 /// Same bytes for any number of threads, and for a run that was saved and restored in between. Const functions may be
-/// called from several threads at a time. `body` and `attachment` are numbers below the count of what there is; only
-/// functions that return a Status check them.
+/// called from several threads at a time. `body`, `obstacle` and `attachment` are numbers of what there is; only
+/// functions that return a Status check them. Of a body that was removed the others have nothing: no particles, zeros.
 class Simulation {
 public:
     /// Errors: as check_world; usage (an option out of its range).
@@ -107,7 +112,10 @@ public:
     std::size_t frame() const; ///< frames done
     double time() const;       ///< s
     const World& world() const;
-    std::size_t body_count() const;
+    std::size_t body_count() const; ///< of all that ever were: a number is given once
+    bool has_body(std::size_t body) const;
+    /// Errors: usage (there is no such body, or it was removed).
+    Status check_body(std::size_t body) const;
     const Body& body(std::size_t body) const; ///< as it is moved: rigid where automatic_rigid made it so
     /// Why automatic_rigid made a body rigid, as in "it has only 5 cells"; "" where it did not.
     const std::string& why_rigid(std::size_t body) const;
@@ -134,6 +142,45 @@ public:
     Status set_air(const Keyed<double>& temperature, double heat_transfer);
     Status set_heat_sources(std::vector<HeatSource> sources);
 
+    // A world that changes: between frames, also while bodies break. Same bytes for any number of threads.
+
+    /// One more body, from now on. It touches others as body_friction and body_restitution say. Returns its number, the
+    /// next. Cost: as for that body in create, and O(bodies). Errors: usage (as check_actor; a body of mpm that is
+    /// coarser than the grid that others of mpm share), cancelled; nothing has changed then. Where memory runs out on the way, the simulation may only be
+    /// destroyed.
+    Result<std::size_t> add_body(const Actor& actor, const RunContext& context);
+    /// A body is gone, with its pieces and with pins, forces, hands and attachments of it; what lay on it wakes. Its
+    /// number is not given again. Errors: as check_body.
+    Status remove_body(std::size_t body);
+
+    /// From now on an obstacle stands at `pose`, from the shape's own axes to the world, and goes on at `velocity`
+    /// (m/s, of its pivot_of) and `spin` (rad/s about that), until it is set again. What touches it feels this
+    /// velocity. A pose that is within a quarter of the finest body's spacing of where it stands is reached evenly in
+    /// the next frame; further it is a jump, which sweeps over nothing and pushes nothing but what it now lies in.
+    /// Errors: usage (no such obstacle; not finite, no turn and shift).
+    Status set_obstacle(std::size_t obstacle, const Eigen::Isometry3d& pose, const Vec3d& velocity = Vec3d::Zero(),
+                        const Vec3d& spin = Vec3d::Zero());
+    /// In the next frame it goes to `pose` evenly, pushing what is in the way, and stands there. Errors: the same.
+    Status move_obstacle(std::size_t obstacle, const Eigen::Isometry3d& pose);
+    Eigen::Isometry3d obstacle_pose(std::size_t obstacle) const; ///< where it stands now
+
+    /// What touched in the last frame, and what no longer did: one event for each two, ascending by body, obstacles
+    /// first. Parts of one body do not count, nor what bodies of mpm touch. What sleeps stays, without an impulse. Of a
+    /// body that was removed all end with the next frame. None after restore.
+    const std::vector<ContactEvent>& contact_events() const;
+
+    /// The first thing that a ray meets. direction: any length above 0. Bodies as they are now, by their surface at
+    /// rest that goes along with their cells, as contacts have it: meshes' details of less than half a spacing are not
+    /// seen. Bodies without a field (of mpm) by their particles, as balls. A ray that starts inside of something meets
+    /// it at once. Cost O(cells) of bodies whose box it meets. Nothing: it meets nothing, or is no ray.
+    std::optional<WorldHit> cast_ray(const Vec3d& origin, const Vec3d& direction, const RayOptions& options = {}) const;
+
+    /// Whether a rigid body may sleep, from now on. No part of what save() keeps. Errors: as check_body.
+    Status set_may_sleep(std::size_t body, bool may_sleep);
+    bool is_asleep(std::size_t body) const;
+    /// What lies on it wakes as it moves. Errors: as check_body.
+    Status wake(std::size_t body);
+
     Energy energy(const RunContext& context) const;
     Momentum momentum() const;
     FractureReport fracture(std::size_t body) const;
@@ -143,6 +190,8 @@ public:
     /// Points that go along with a body: its driver, or all of a mesh. Positions on the body at rest, m.
     /// Returns a number for `attached`. Cost: as embed.
     std::size_t attach(std::size_t body, std::span<const Vec3f> points, const RunContext& context);
+    /// False once its body was removed; `attached` does nothing then.
+    bool has_attachment(std::size_t attachment) const;
     /// The same, each point with a piece, by the partition's number: what several pieces' copies of one point are
     /// carried by. Until the body breaks copies have the same bytes, and where pieces hold together also afterwards;
     /// then each goes with its own piece, also where that ends before it. Of a body that breaks; above, each point goes
@@ -161,14 +210,16 @@ public:
     MatterParticles matter(std::size_t body) const;
     double heat() const; ///< J in bodies of mpm, from 0 K
 
-    /// Everything that moves, as bytes (docs/scenes.md), and back. A state goes on only with the bodies, the world and
-    /// the options that it was saved with, but for what the functions above may set. Errors: bad_file (damaged),
-    /// mismatch (of others); nothing has changed then.
+    /// Everything that moves, as bytes (docs/scenes.md), and back; obstacles that were set, too. A state goes on only
+    /// with the bodies, the world and the options that it was saved with, but for what the functions above may set:
+    /// the same bodies have to have come and gone, in the same order. Errors: bad_file (damaged), mismatch (of others);
+    /// nothing has changed then.
     std::string save() const;
     Status restore(std::string_view bytes);
 
 private:
     explicit Simulation(std::unique_ptr<SimulationState> state);
+    Status check_obstacle(std::size_t obstacle) const;
     Status check_count(std::size_t body, const Vectors& vectors, const char* what) const;
     std::size_t attach_on_grid(std::size_t body, std::span<const Vec3f> points, const RunContext& context);
     Status check_vectors(std::size_t body, const Vectors& vectors, const char* what) const;

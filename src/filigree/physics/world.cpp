@@ -43,7 +43,14 @@ Eigen::Isometry3d RigidMotion::at(double time) const {
     Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
     motion.linear() = turn;
     motion.translation() = centre - turn * centre + move.at(time);
-    return motion;
+    return motion * start;
+}
+
+Vec3d pivot_of(const Obstacle& obstacle) {
+    if (const auto* ground = std::get_if<HalfSpace>(&obstacle.shape)) return ground->point;
+    if (const auto* ball = std::get_if<Ball>(&obstacle.shape)) return ball->centre;
+    if (const auto* box = std::get_if<Cuboid>(&obstacle.shape)) return box->centre;
+    return std::get<MeshObstacle>(obstacle.shape).offset;
 }
 
 DistanceField::Sample distance_to(const Obstacle& obstacle, const Eigen::Isometry3d& motion, const Vec3f& point) {

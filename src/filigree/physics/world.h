@@ -33,6 +33,8 @@ struct RigidMotion {
     Vec3d centre = Vec3d::Zero();
     Keyed<Vec3d> move{{}, {}, Vec3d::Zero()};  ///< m
     Keyed<Vec3d> angle{{}, {}, Vec3d::Zero()}; ///< axis times radians
+    /// A turn and a shift before all of this, as where something was put (Simulation::set_obstacle).
+    Eigen::Isometry3d start = Eigen::Isometry3d::Identity();
 
     Eigen::Isometry3d at(double time) const;
     bool moves() const { return !move.times.empty() || !angle.times.empty(); }
@@ -72,6 +74,10 @@ struct Obstacle {
     Keyed<double> temperature{{}, {}, 293}; ///< K, above 0; of what bodies of mpm touch
     double heat_transfer = 0;               ///< W/(m^2 K), 0 or more: heat that it exchanges with them
 };
+
+/// What an obstacle is turned about where nothing else is said, before its motion, m: the middle of a ball or a cuboid,
+/// a half-space's point, a mesh's origin.
+Vec3d pivot_of(const Obstacle& obstacle);
 
 /// Distance and outward normal of an obstacle that stands at `motion` (its RigidMotion at some time). World, m.
 DistanceField::Sample distance_to(const Obstacle& obstacle, const Eigen::Isometry3d& motion, const Vec3f& point);

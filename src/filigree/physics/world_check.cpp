@@ -47,6 +47,13 @@ public:
         finite(motion.centre, place + ".centre");
         keys(motion.move, place + ".move");
         keys(motion.angle, place + ".angle");
+        pose(motion.start, place + ".start");
+    }
+    void pose(const Eigen::Isometry3d& pose, const std::string& place) {
+        const Mat3d turn = pose.linear();
+        require(pose.translation().allFinite() && (turn.transpose() * turn - Mat3d::Identity()).norm() < 1e-6 &&
+                    turn.determinant() > 0,
+                place, "must be a turn and a shift");
     }
     void body(std::size_t body, const std::string& place) {
         require(body < actors_.size(), place + ".body", "is not there: bodies are counted from 0");
@@ -62,10 +69,7 @@ public:
         require(actor.body != nullptr, place + ".body", "is missing");
         if (!actor.body) return;
         require(actor.body->particle_count() > 0, place + ".body", "has no particles");
-        const Mat3d turn = actor.placement.linear();
-        require(actor.placement.translation().allFinite() &&
-                    (turn.transpose() * turn - Mat3d::Identity()).norm() < 1e-6 && turn.determinant() > 0,
-                place + ".placement", "must be a turn and a shift");
+        pose(actor.placement, place + ".placement");
         finite(actor.velocity, place + ".velocity");
         finite(actor.spin, place + ".spin");
         if (actor.fracture) fracture(*actor.fracture, actor, place + ".fracture");
@@ -198,6 +202,20 @@ Status check_world(const World& world, std::span<const Actor> actors) {
         check.keys(force.force, place + ".force");
     }
     for (std::size_t h = 0; h < world.hands.size(); ++h) check.hand(world.hands[h], numbered("world.hands", h));
+    return check.status();
+}
+
+Status check_actor(const Actor& actor) {
+    Checker check({});
+    check.actor(actor, "actor");
+    return check.status();
+}
+
+Status check_obstacle_motion(const Eigen::Isometry3d& pose, const Vec3d& velocity, const Vec3d& spin) {
+    Checker check({});
+    check.pose(pose, "pose");
+    check.finite(velocity, "velocity");
+    check.finite(spin, "spin");
     return check.status();
 }
 

@@ -23,6 +23,19 @@ const Cells* corners_of(const Body& body) {
 
 } // namespace
 
+BodyState free_slot() {
+    static const std::shared_ptr<const Body> nothing = [] {
+        auto body = std::make_shared<Body>();
+        body->cells.spacing = std::numeric_limits<double>::infinity();
+        return body;
+    }();
+    BodyState state;
+    state.body = nothing;
+    state.actor = BodyState::kNobody;
+    state.is_absent = true;
+    return state;
+}
+
 Mat3f bounded_stretch(const Mat3f& gradient) {
     if (!gradient.allFinite()) return Mat3f::Identity();
     // Of stretches a >= b >= c: a <= |F|, and c = det F / (a b) >= 2 det F / |F|^2.

@@ -28,8 +28,10 @@ struct RigidPose {
 inline constexpr float kContactShare = 1;
 
 struct BodyState {
+    static constexpr std::size_t kNobody = ~std::size_t{0};
+
     std::shared_ptr<const Body> body;
-    std::size_t actor = 0;                                       ///< that it belongs to: a piece, to the one that broke
+    std::size_t actor = 0; ///< that it belongs to: a piece, to the one that broke; kNobody: the slot is free
     Eigen::Isometry3d placement = Eigen::Isometry3d::Identity(); ///< Actor::placement
     bool is_absent = false;  ///< a body that has broken, a piece of one that has not, or one on the grid
     bool is_on_grid = false; ///< of the model mpm: moved by mpm::Bodies; it has no elasticity
@@ -48,6 +50,7 @@ struct BodyState {
     BodyHit hit;           ///< of a stiff body
     float rubbed_seconds = 0; ///< at whose frames' starts it rubbed, since it touched nothing (vibration.h)
     float pushed_way = 0; ///< m that particles were moved one by one, at most; a rigid body's pose has to follow
+    bool is_free() const { return actor == kNobody; } ///< no body is here: it was removed
     bool sleeps() const { return is_absent || (rigid && rigid->sleeps); }
 
     /// Of a piece: a light corner, of cells that are hardly filled, and the heaviest corner of those cells.
@@ -69,6 +72,9 @@ struct BodyState {
     std::vector<std::uint8_t> hidden; ///< 1: a surface point on a crack that has not opened; empty: none
     bool is_hidden(std::size_t point) const { return !hidden.empty() && hidden[point]; }
 };
+
+/// A slot that waits for a body: absent, without particles, and wider than anything.
+BodyState free_slot();
 
 /// A gradient with its stretches within 1/4 and 4; the identity for one that is not finite.
 Mat3f bounded_stretch(const Mat3f& gradient);

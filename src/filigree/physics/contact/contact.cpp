@@ -24,35 +24,77 @@ constexpr float kLongestWay = 0.3f; ///< spacings a substep that one body may go
 
 Contacts::Contacts(const World& world, std::size_t actors, bool between_bodies, bool within_bodies)
     : world_(world), laws_(world, actors), between_bodies_(between_bodies), within_bodies_(within_bodies) {
-    for (const Obstacle& obstacle : world.obstacles) {
-        const auto* ground = std::get_if<HalfSpace>(&obstacle.shape);
-        const bool stands = ground && !obstacle.motion.moves();
-        const Vec3d out = stands ? Vec3d(obstacle.motion.at(0).linear() * ground->normal.normalized()) : Vec3d::Zero();
-        towards_.push_back(-out.cast<float>());
-        shapes_.emplace_back(obstacle);
+    for (std::size_t o = 0; o < world.obstacles.size(); ++o) {
+        towards_.push_back(way_towards(o));
+        shapes_.emplace_back(world.obstacles[o]);
     }
 }
 
+Vec3f Contacts::way_towards(std::size_t obstacle) const {
+    const RigidMotion& motion = world_.obstacles[obstacle].motion;
+    const auto* ground = std::get_if<HalfSpace>(&world_.obstacles[obstacle].shape);
+    if (!ground || motion.moves()) return Vec3f::Zero();
+    return -(motion.at(0).linear() * ground->normal.normalized()).cast<float>();
+}
+
 void Contacts::begin(std::span<const BodyState> bodies) {
-    std::map<const Body*, std::shared_ptr<const BodyMatter>> known; // pieces of one kind share theirs
-    std::map<const Matter*, std::shared_ptr<const OwnCells>> own_cells;
-    for (const BodyState& state : bodies) {
-        std::shared_ptr<const BodyMatter>& matter = known[state.body.get()];
-        if (!matter) {
-            BodyMatter made;
-            if (state.body->field) made = {std::make_shared<const Matter>(*state.body), stiffness_per_area(state)};
-            matter = std::make_shared<const BodyMatter>(std::move(made));
-        }
-        matter_.push_back(matter);
-        std::shared_ptr<const OwnCells>& own = own_cells[matter->matter.get()];
-        if (matter->matter && within_bodies_ && !state.rigid && !own)
-            own = std::make_shared<const OwnCells>(*matter->matter);
-        own_cells_.push_back(own);
-        motions_.add(state);
+    std::map<const Body*, std::size_t> first; // of its kind: pieces of one kind share what belongs to the kind
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+        make_ready(bodies[b], b, first.emplace(bodies[b].body.get(), b).first->second);
+}
+
+/// like: a body of its kind that is ready, or itself.
+void Contacts::make_ready(const BodyState& state, std::size_t body, std::size_t like) {
+    if (body >= matter_.size()) {
+        matter_.resize(body + 1, std::make_shared<const BodyMatter>());
+        own_cells_.resize(body + 1);
+        recovers_.resize(body + 1);
+        touched_.resize(body + 1);
+        loads_.resize(body + 1);
+        events_.resize(body + 1);
     }
-    recovers_.assign(bodies.size(), 0);
-    touched_.assign(bodies.size(), 0);
-    loads_.assign(bodies.size(), {});
+    motions_.set_body(body, state, like);
+    matter_[body] = matter_[like];
+    own_cells_[body] = own_cells_[like];
+    if (like != body || !state.body->field) return;
+    BodyMatter made{std::make_shared<const Matter>(*state.body), stiffness_per_area(state)};
+    if (within_bodies_ && !state.rigid) own_cells_[body] = std::make_shared<const OwnCells>(*made.matter);
+    matter_[body] = std::make_shared<const BodyMatter>(std::move(made));
+}
+
+void Contacts::add_body(std::span<const BodyState> bodies, std::size_t body) {
+    std::size_t like = 0;
+    while (like < matter_.size() && (like == body || bodies[like].body != bodies[body].body)) ++like;
+    make_ready(bodies[body], body, like < matter_.size() ? like : body);
+    reach_ = -1; // it may be near others
+}
+
+void Contacts::remove_body(std::span<const BodyState> bodies, std::size_t body) {
+    const auto is_of_kind = [&](const BodyState& other) { return other.body == bodies[body].body; };
+    if (std::ranges::count_if(bodies, is_of_kind) == 1) crushed_.forget(bodies[body].body);
+    const ColliderId id = ColliderId::body(body);
+    std::erase_if(pairs_, [&](const ContactPair& pair) { return pair.points == id || pair.touched == id; });
+    matter_[body] = std::make_shared<const BodyMatter>();
+    own_cells_[body] = nullptr;
+    recovers_[body] = touched_[body] = 0;
+    motions_.remove_body(body);
+    list_work(bodies);
+}
+
+void Contacts::set_obstacle(std::size_t obstacle, bool is_jump) {
+    towards_[obstacle] = way_towards(obstacle);
+    reach_ = -1;
+    const ColliderId id = ColliderId::obstacle(obstacle);
+    for (ContactPair& pair : pairs_) {
+        if (pair.points != id && pair.touched != id) continue;
+        pair.reach = -1;
+        if (!is_jump) continue;
+        pair.knows_side = false;
+        for (Candidate& at : pair.candidates) {
+            at.grasp = {};
+            at.rigid_force = Vec3f::Zero();
+        }
+    }
 }
 
 ContactPair Contacts::make_pair(ColliderId points, ColliderId touched, std::span<const BodyState> bodies) const {
@@ -136,6 +178,7 @@ Vec3f Contacts::touch(ContactPair& pair, std::size_t k, const Points& points, co
     Vec3f offset = Vec3f::Zero();
     if (at.grasp.holds) offset = along_surface(touched.from_anchor(at, point), touch.normal);
     const bool landed = !at.grasp.holds;
+    at.approach = -touch.velocity.dot(touch.normal);
     const Vec3f force = touch_force(touch, offset, at.grasp, dt, smooth_speed(world_, dt));
     if (landed || at.grasp.slides) touched.put_anchor(at, point, offset);
     return force;
@@ -158,8 +201,25 @@ ContactPoint Contacts::contact_point(ContactPair& pair, Candidate& at, const Vec
         else if (pair.touched.is_obstacle())
             point.other_velocity = touched.velocity(at, point.place);
     });
-    if (pair.is_of_bodies()) point.other = pair.touched.number();
+    if (pair.is_of_bodies())
+        point.other = pair.touched.number();
+    else
+        point.obstacle = is_edge ? pair.points.number() : pair.touched.number();
     return point;
+}
+
+/// To the frame's events: what pushes a body along the normal, N s, by forces or, is_push, beside them.
+void Contacts::tell(const ContactPair& pair, const Vec3f& place, const Vec3f& normal, float impulse, float approach,
+                    bool is_push) {
+    if (pair.is_own()) return;
+    const bool is_edge = pair.points.is_obstacle();
+    const Index body = is_edge ? pair.touched.number() : pair.points.number();
+    const ColliderId other = is_edge ? pair.points : pair.touched;
+    const Vec3f towards = is_edge ? Vec3f(-normal) : normal;
+    if (is_push)
+        events_.push(body, other, place, towards, impulse, approach);
+    else
+        events_.touch(body, other, place, towards, impulse, approach);
 }
 
 void Contacts::note_touch(const ContactPair& pair, const Candidate& at, ContactReport& report) {
@@ -223,6 +283,7 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
         }
     });
     ContactReport report;
+    events_.begin_forces();
     rigid.clear();
     touched_.assign(touched_.size(), 0);
     loads_.assign(loads_.size(), {});
@@ -238,6 +299,7 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
                     rigid.add(contact_point(pair, at, force, bodies, poses));
                 } else {
                     add_loads(pair, at, force, points, touched, bodies);
+                    tell(pair, points.position(at), at.normal, dt * force.dot(at.normal), at.approach, false);
                     points.push(at, force);
                     touched.push(at, -force);
                 }
@@ -253,7 +315,7 @@ ContactReport Contacts::add_forces(std::span<BodyState> bodies, double time, flo
 }
 
 template <class Points, class Touched>
-void Contacts::push_out(Candidate& at, const ContactPair& pair, const Points& points, const Touched& touched) const {
+void Contacts::push_out(Candidate& at, const ContactPair& pair, const Points& points, const Touched& touched) {
     const Vec3f point = points.position(at);
     const Meeting met = touched.meet(at, pair, point, {}); // others have moved it since
     if (met.normal.isZero(0) || at.is_tangled) return;
@@ -263,6 +325,7 @@ void Contacts::push_out(Candidate& at, const ContactPair& pair, const Points& po
     const Vec3f velocity = points.velocity(at) - touched.velocity(at, point);
     const Vec3f way = too_deep / gives * met.normal;
     const Vec3f push = std::max(0.0f, -velocity.dot(met.normal)) / gives * met.normal;
+    tell(pair, point, met.normal, push.norm(), 0, true);
     points.move(at, way, push, too_deep);
     touched.move(at, -way, -push, too_deep);
 }

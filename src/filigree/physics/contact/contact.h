@@ -3,6 +3,7 @@
 #pragma once
 
 #include "filigree/physics/contact/colliders.h"
+#include "filigree/physics/contact/contact_events.h"
 #include "filigree/physics/contact/crushed_particles.h"
 #include "filigree/physics/contact/motion_bounds.h"
 #include "filigree/physics/contact/own_cells.h"
@@ -30,6 +31,38 @@ public:
     Contacts(const World& world, std::size_t actors, bool between_bodies, bool within_bodies);
     /// Once, when all bodies are there.
     void begin(std::span<const BodyState> bodies);
+
+    // Between frames the world may change.
+    /// A body came into a slot: one that was free, or the next. Cost O(slots), and what the body itself takes; nothing
+    /// about the others is made anew but the next search.
+    void add_body(std::span<const BodyState> bodies, std::size_t body);
+    /// Forgets a body that is still there; its slot will be free.
+    void remove_body(std::span<const BodyState> bodies, std::size_t body);
+    /// An obstacle's motion was replaced. is_jump: it stands elsewhere, so that what was on its other side is where it
+    /// is, and nothing holds on to it; else points are followed to where it stands.
+    void set_obstacle(std::size_t obstacle, bool is_jump);
+    /// Calls visit(other) for bodies that touch a body, or may soon.
+    template <class Visit>
+    void each_beside(std::size_t body, const Visit& visit) const {
+        const ColliderId id = ColliderId::body(body);
+        for (const ContactPair& pair : pairs_)
+            if (pair.is_of_bodies() && !pair.is_own() && !pair.candidates.empty() &&
+                (pair.points == id || pair.touched == id))
+                visit((pair.points == id ? pair.touched : pair.points).number());
+    }
+    /// Whether a body's surface touches an obstacle, or may soon.
+    bool is_beside_obstacle(std::size_t body, std::size_t obstacle) const {
+        return std::ranges::any_of(pairs_, [&](const ContactPair& pair) {
+            return pair.points == ColliderId::body(body) && pair.touched == ColliderId::obstacle(obstacle) &&
+                   !pair.candidates.empty();
+        });
+    }
+    /// The cells of a body as matter that points are inside of; null of bodies without a field.
+    const Matter* matter(std::size_t body) const { return matter_[body]->matter.get(); }
+    std::span<const ObstacleShape> shapes() const { return shapes_; }
+    /// What touches in a frame.
+    ContactEvents& events() { return events_; }
+    const ContactEvents& events() const { return events_; }
 
     struct Search {
         double time;  ///< s
@@ -110,6 +143,7 @@ public:
         std::vector<PairMemory> pairs;           ///< ascending
         std::vector<CandidateMemory> candidates; ///< of one pair after the other, ascending by point
         std::vector<std::uint8_t> recovers;
+        std::vector<ContactEvents::PairMemory> touched; ///< in the last frame
     };
     Memory memory() const;
     /// Instead of what there is. False, and nothing changed, where it is not of these bodies.
@@ -139,7 +173,9 @@ private:
     template <class Points, class Touched>
     Vec3f touch(ContactPair& pair, std::size_t k, const Points& points, const Touched& touched, float dt) const;
     template <class Points, class Touched>
-    void push_out(Candidate& at, const ContactPair& pair, const Points& points, const Touched& touched) const;
+    void push_out(Candidate& at, const ContactPair& pair, const Points& points, const Touched& touched);
+    void tell(const ContactPair& pair, const Vec3f& place, const Vec3f& normal, float impulse, float approach,
+              bool is_push);
     ContactPoint contact_point(ContactPair& pair, Candidate& at, const Vec3f& normal, std::span<BodyState> bodies,
                                const ObstaclePoses& poses) const;
     static bool is_too_deep(const ContactPair& pair) { return !pair.is_rigid && pair.deepest > first_depth(pair); }
@@ -152,6 +188,8 @@ private:
     void add_loads(const ContactPair& pair, const Candidate& at, const Vec3f& force, const Points& points,
                    const Touched& touched, std::span<const BodyState> bodies);
 
+    Vec3f way_towards(std::size_t obstacle) const;
+    void make_ready(const BodyState& state, std::size_t body, std::size_t like);
     ContactPair make_pair(ColliderId points, ColliderId touched, std::span<const BodyState> bodies) const;
     Box extent(const BodyState& body, std::size_t number) const;
     float bound_between(const ContactPair& pair, const Extremes& points, const Extremes& touched) const;
@@ -198,6 +236,7 @@ private:
     static constexpr std::uint8_t kOnObstacle = 1, kInMatter = 2, kInItself = 4, kRubs = 8;
     std::vector<std::uint8_t> touched_; ///< of each body
     std::vector<BodyLoad> loads_;       ///< of each body, if it is stiff
+    ContactEvents events_;
 };
 
 } // namespace filigree

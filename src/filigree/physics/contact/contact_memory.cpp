@@ -7,7 +7,12 @@
 namespace filigree {
 
 Contacts::Memory Contacts::memory() const {
-    Memory memory{.travelled = travelled_, .reach = reach_, .pairs = {}, .candidates = {}, .recovers = recovers_};
+    Memory memory{.travelled = travelled_,
+                  .reach = reach_,
+                  .pairs = {},
+                  .candidates = {},
+                  .recovers = recovers_,
+                  .touched = events_.memory()};
     for (const ContactPair& pair : pairs_) {
         memory.pairs.push_back({pair.points, pair.touched, Index(pair.candidates.size()),
                                 std::uint32_t(pair.knows_side), pair.displacement, pair.reach, pair.since});
@@ -82,6 +87,7 @@ bool Contacts::set_memory(const Memory& memory, std::span<const BodyState> bodie
         pair.pad();
     }
     list_work(bodies);
+    events_.set_memory(memory.touched);
     return true;
 }
 

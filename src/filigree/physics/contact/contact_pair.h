@@ -27,6 +27,7 @@ struct Candidate {
     Matter::Place place;         ///< in matter: where it was found last
     float depth = 0;             ///< m, now; of rigid pairs below 0 where it is outside, but near
     Vec3f normal{0, 0, 0};       ///< unit, in the world, out of what it touches
+    float approach = 0;          ///< m/s that it comes nearer
     contact_law::Grasp grasp;    ///< how friction holds it ...
     Matter::Place anchor;        ///< ... to this place; of an obstacle `local` is in its own axes, m
     Vec3f entry_normal{0, 0, 0}; ///< unit, at rest or in the obstacle's axes: where it came in; zero outside

@@ -19,6 +19,7 @@ public:
     /// outwards: of the obstacle's surface where the body is in it; particles that are past its middle stay.
     void push_out(BodyState& body, const ContactPair& pair, const ObstacleShape& shape, const Vec3f& outwards,
                   const ObstaclePoses& poses, const RunContext& context);
+    void forget(const std::shared_ptr<const Body>& body) { depths_.erase(body); } ///< there is none of it any more
 
 private:
     struct Depths {                      ///< of each particle

@@ -61,14 +61,22 @@ MotionBounds::Followed MotionBounds::followed(const BodyState& body) {
     return followed;
 }
 
-void MotionBounds::add(const BodyState& body) {
-    std::shared_ptr<const Followed>& follows = known_[body.body];
-    if (!follows) follows = std::make_shared<const Followed>(followed(body));
-    followed_.push_back(follows);
-    velocities_.emplace_back();
-    shifts_.emplace_back();
-    places_.emplace_back();
-    last_.emplace_back();
+void MotionBounds::set_body(std::size_t number, const BodyState& body, std::size_t like) {
+    if (number >= followed_.size()) {
+        followed_.resize(number + 1);
+        velocities_.resize(number + 1);
+        shifts_.resize(number + 1);
+        places_.resize(number + 1);
+        last_.resize(number + 1);
+    }
+    followed_[number] = like == number ? std::make_shared<const Followed>(followed(body)) : followed_[like];
+}
+
+void MotionBounds::remove_body(std::size_t number) {
+    followed_[number] = nullptr;
+    velocities_[number] = shifts_[number] = {};
+    places_[number] = {};
+    last_[number].clear();
 }
 
 /// Of particles that are followed: of their values, less `from` unless that is null.
@@ -114,7 +122,7 @@ void MotionBounds::find_shifts(std::span<const BodyState> bodies, const RunConte
 void MotionBounds::count_from_here(std::span<const BodyState> bodies, bool sleepers) {
     for (std::size_t b = 0; b < bodies.size(); ++b)
         if (!bodies[b].is_absent && (sleepers || !bodies[b].sleeps())) places_[b] = bodies[b].corner_positions();
-    shifts_.assign(bodies.size(), {});
+    shifts_.assign(shifts_.size(), {});
 }
 
 } // namespace filigree

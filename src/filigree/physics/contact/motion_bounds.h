@@ -4,7 +4,6 @@
 #include "filigree/physics/body/body_state.h"
 #include "filigree/physics/contact/extremes_kernel.h"
 
-#include <map>
 #include <memory>
 
 namespace filigree {
@@ -12,7 +11,9 @@ namespace filigree {
 /// By the corners of a body's cells, but for light ones, which hardly move the surface.
 class MotionBounds {
 public:
-    void add(const BodyState& body); ///< one more body
+    /// A body is at this number; like: one of its kind that is there already, or itself.
+    void set_body(std::size_t number, const BodyState& body, std::size_t like);
+    void remove_body(std::size_t number);
 
     /// Bodies have moved for dt, s. A rigid one may have moved by other velocities than it has now: contacts correct
     /// depths by velocities that they take away again.
@@ -46,8 +47,7 @@ private:
     void add_motion(std::size_t body, const Vectors& positions, float dt);
     Extremes extremes(std::size_t body, const Vectors& values, const Vectors* from) const;
 
-    std::map<std::shared_ptr<const Body>, std::shared_ptr<const Followed>> known_; ///< pieces of one kind share theirs
-    std::vector<std::shared_ptr<const Followed>> followed_;
+    std::vector<std::shared_ptr<const Followed>> followed_; ///< bodies of one kind share theirs
     std::vector<Extremes> velocities_, shifts_;
     std::vector<Vectors> places_;          ///< of corners, where shifts are counted from
     std::vector<std::vector<Vec3f>> last_; ///< of a rigid body: where the corners that are followed were

@@ -50,7 +50,7 @@ PairContact PairLaws::of(std::size_t body, std::size_t other) const {
     const std::uint64_t key = key_of(body, other);
     const auto pair = std::ranges::lower_bound(pairs_, key, {}, &decltype(pairs_)::value_type::first);
     if (pair != pairs_.end() && pair->first == key) return pair->second;
-    return of_classes_[class_of_[body] * class_count_ + class_of_[other]];
+    return of_classes_[class_of(body) * class_count_ + class_of(other)];
 }
 
 } // namespace filigree

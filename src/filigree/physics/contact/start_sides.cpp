@@ -115,12 +115,13 @@ Vec3d StartSides::start_of(std::size_t point) const {
     return mean;
 }
 
-std::vector<StartOverlap> find_start_overlaps(const World& world, std::span<const BodyState> bodies) {
+std::vector<StartOverlap> find_start_overlaps(const World& world, std::span<const ObstacleShape> shapes,
+                                              std::span<const BodyState> bodies, double time) {
     constexpr double kDeep = 0.75; // spacings: what is less deep is pushed out softly
     std::vector<StartOverlap> found;
-    const ObstaclePoses poses(world, 0);
+    const ObstaclePoses poses(world, time);
     for (std::size_t o = 0; o < world.obstacles.size(); ++o) {
-        const ObstacleShape shape(world.obstacles[o]);
+        const ObstacleShape& shape = shapes[o];
         const Eigen::Isometry3d to_own = poses.at(o).inverse();
         for (std::size_t b = 0; b < bodies.size(); ++b) {
             const BodyState& body = bodies[b];

@@ -33,6 +33,8 @@ private:
 };
 
 /// Cost O(bodies * obstacles), and O(points log F) for those near each other.
-std::vector<StartOverlap> find_start_overlaps(const World& world, std::span<const BodyState> bodies);
+/// shapes: of the obstacles. time: s, of the world. Bodies count from 0 in what is found.
+std::vector<StartOverlap> find_start_overlaps(const World& world, std::span<const ObstacleShape> shapes,
+                                              std::span<const BodyState> bodies, double time = 0);
 
 } // namespace filigree

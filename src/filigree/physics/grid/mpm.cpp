@@ -34,21 +34,21 @@ Float4 lanes(float x, float y, float z, float w) { return Float4{x, y, z, w}; }
 
 } // namespace
 
-Bodies::Bodies(const World& world, std::span<const Actor> actors)
-    : world_(world), laws_(world, actors.size()), field_of_(actors.size(), kNoIndex),
-      spacing_(coarsest_spacing(actors)), grid_(2 * spacing_), barriers_(world, spacing_) {
+Bodies::Bodies(const World& world, std::span<const Actor> actors, std::size_t first, float spacing)
+    : world_(world), laws_(world, first + actors.size()), field_of_(first + actors.size(), kNoIndex),
+      spacing_(std::max(spacing, coarsest_spacing(actors))), grid_(2 * spacing_), barriers_(world, spacing_) {
     for (std::size_t a = 0; a < actors.size(); ++a) {
         const Body& body = *actors[a].body;
         if (body.material.model != MaterialModel::mpm) continue;
-        field_of_[a] = Index(matter_.size());
+        field_of_[first + a] = Index(matter_.size());
         first_.push_back(particles_.size());
-        actor_of_field_.push_back(a);
+        actor_of_field_.push_back(first + a);
         matter_.emplace_back(body.material, world.heat_pace);
         has_heat_ |= matter_.back().has_heat();
         start_enthalpy_.push_back(matter_.back().enthalpy(float(body.material.temperature)));
         for (std::size_t p = 0; p < body.particle_count(); ++p) {
-            particles_.push_back(at_rest(body.mass[p], body.volume[p], field_of_[a]));
-            field_.push_back(field_of_[a]);
+            particles_.push_back(at_rest(body.mass[p], body.volume[p], field_of_[first + a]));
+            field_.push_back(field_of_[first + a]);
         }
     }
     first_.push_back(particles_.size());
@@ -57,7 +57,39 @@ Bodies::Bodies(const World& world, std::span<const Actor> actors)
         matter.limit_viscosity(grid_.spacing());
         grid_mass_.push_back(matter.density() * grid_.spacing() * grid_.spacing() * grid_.spacing());
     }
-    find_surfaces(actors);
+    find_surfaces(actors, first);
+}
+
+/// What belongs to a body is worked out on a grid of its own, as it is when all bodies are made at once.
+void Bodies::add(const Actor& actor) {
+    const auto field = Index(matter_.size());
+    Bodies alone(world_, std::span(&actor, 1), field_of_.size(), spacing_);
+    field_of_.push_back(alone.matter_.empty() ? kNoIndex : field);
+    if (alone.matter_.empty()) return;
+    matter_.push_back(alone.matter_.front());
+    actor_of_field_.push_back(alone.actor_of_field_.front());
+    start_enthalpy_.push_back(alone.start_enthalpy_.front());
+    grid_mass_.push_back(alone.grid_mass_.front());
+    surface_.push_back(alone.surface_.front());
+    has_heat_ |= alone.has_heat_;
+    particles_.insert(particles_.end(), alone.particles_.begin(), alone.particles_.end());
+    field_.resize(particles_.size(), field);
+    first_.push_back(particles_.size());
+}
+
+void Bodies::remove(std::size_t actor) {
+    const Index field = std::exchange(field_of_[actor], kNoIndex);
+    if (field == kNoIndex) return;
+    const std::size_t begin = first_[field], end = first_[field + 1];
+    const auto erase = [&](auto& values) {
+        values.erase(values.begin() + std::ptrdiff_t(begin), values.begin() + std::ptrdiff_t(end));
+    };
+    erase(particles_);
+    erase(field_);
+    for (std::size_t f = field + 1; f < first_.size(); ++f) first_[f] -= end - begin;
+    std::erase_if(fixed_, [&](std::uint32_t number) { return number >= begin && number < end; });
+    for (std::uint32_t& number : fixed_)
+        if (number >= end) number -= std::uint32_t(end - begin);
 }
 
 Particle Bodies::at_rest(float mass, float volume, std::size_t field) const {
@@ -72,10 +104,10 @@ Particle Bodies::at_rest(float mass, float volume, std::size_t field) const {
 }
 
 /// The gradient of mass around particles tells where the surface is, and not quite how large. At rest that is known.
-void Bodies::find_surfaces(std::span<const Actor> actors) {
+void Bodies::find_surfaces(std::span<const Actor> actors, std::size_t first) {
     const RunContext alone(1);
     for (std::size_t f = 0; f < matter_.size(); ++f)
-        set_positions(actor_of_field_[f], actors[actor_of_field_[f]].body->rest);
+        set_positions(actor_of_field_[f], actors[actor_of_field_[f] - first].body->rest);
     grid_.begin(particles_, field_, {}, alone);
     scatter(0, alone);
     std::vector<double> told(matter_.size());
@@ -93,7 +125,7 @@ void Bodies::find_surfaces(std::span<const Actor> actors) {
         }
     for (std::size_t f = 0; f < matter_.size(); ++f) {
         double area = 0;
-        for (const float part : actors[actor_of_field_[f]].body->surface.areas) area += double(part);
+        for (const float part : actors[actor_of_field_[f] - first].body->surface.areas) area += double(part);
         surface_.push_back(told[f] > 0 ? std::clamp(float(area / told[f]), 1.0f, kMostSurface) : 1.0f);
     }
 }
@@ -165,7 +197,8 @@ float Bodies::longest_step(double now, const RunContext& context) const {
     float squared_speed = 0;
     for (const float squared : fastest) squared_speed = std::max(squared_speed, squared);
     float step = kMostTravel * grid_.spacing() / std::sqrt(std::max(squared_speed, 1e-12f));
-    for (const Matter& matter : matter_) step = std::min(step, matter.longest_step(grid_.spacing()));
+    for (std::size_t f = 0; f < matter_.size(); ++f)
+        if (first_[f] < first_[f + 1]) step = std::min(step, matter_[f].longest_step(grid_.spacing()));
     if (approach_ > 0) step = std::min(step, kMostMeeting * grid_.spacing() / approach_);
     return std::min(step, longest_step_beside_obstacles(now));
 }
@@ -535,6 +568,11 @@ std::size_t Bodies::add_tracers(std::size_t actor, std::span<const Vec3f> points
     const std::size_t first = tracers_.size();
     for (std::size_t k = 0; k < points.size(); ++k) tracers_.push_back({points[k], gradients[k], 0, field_of_[actor]});
     return first;
+}
+
+void Bodies::remove_tracers(std::size_t first, std::size_t count) {
+    const auto begin = tracers_.begin() + std::ptrdiff_t(first);
+    tracers_.erase(begin, begin + std::ptrdiff_t(count));
 }
 
 void Bodies::read_tracers(std::size_t first, std::span<Vec3f> points, std::span<Mat3f> gradients) const {

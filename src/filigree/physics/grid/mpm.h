@@ -21,8 +21,13 @@ namespace filigree::mpm {
 /// All bodies of one simulation that are of the model mpm; they share a grid of twice their coarsest spacing.
 class Bodies {
 public:
-    /// actors: all of the simulation's.
-    Bodies(const World& world, std::span<const Actor> actors);
+    /// actors: numbered from `first` on, with none before them. spacing: m, of the coarsest particles that may come.
+    Bodies(const World& world, std::span<const Actor> actors, std::size_t first = 0, float spacing = 0);
+    /// The next actor, of any model; of mpm no coarser than `spacing`. Cost O(its particles).
+    void add(const Actor& actor);
+    /// Cost O(particles).
+    void remove(std::size_t actor);
+    float spacing() const { return spacing_; } ///< m, of the coarsest particles
 
     bool empty() const { return particles_.empty(); }
     bool has(std::size_t actor) const { return field_of_[actor] != kNoIndex; }
@@ -59,6 +64,7 @@ public:
 
     /// Points that go along from where they are now, with gradients from rest to there. Returns the first's number.
     std::size_t add_tracers(std::size_t actor, std::span<const Vec3f> points, std::span<const Mat3f> gradients);
+    void remove_tracers(std::size_t first, std::size_t count);
     void read_tracers(std::size_t first, std::span<Vec3f> points, std::span<Mat3f> gradients) const;
     void read_renewal(std::size_t first, std::span<float> renewal) const;
 
@@ -75,7 +81,7 @@ private:
 
     Vec3f emptiness(const AtParticle& found, std::size_t field) const;
     Particle at_rest(float mass, float volume, std::size_t field) const; ///< at the origin
-    void find_surfaces(std::span<const Actor> actors);
+    void find_surfaces(std::span<const Actor> actors, std::size_t first);
     float longest_step_beside_obstacles(double now) const; ///< s
     void find_shadows(const RunContext& context);
     void scatter(float dt, const RunContext& context);

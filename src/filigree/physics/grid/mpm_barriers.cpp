@@ -55,6 +55,7 @@ void Barriers::begin_step(double from, double until) {
     after_.emplace(world_, until);
     for (std::size_t w = 0; w < walls_.size(); ++w) {
         const RigidMotion& motion = world_.obstacles[walls_[w].obstacle].motion;
+        walls_[w].moves = motion.moves(); // it may have been set
         poses_[w].after = motion.at(until);
         // What jumps is where it is, and sweeps over nothing.
         poses_[w].before = walls_[w].moves && !jumps_between(motion, from, until) ? motion.at(from) : poses_[w].after;

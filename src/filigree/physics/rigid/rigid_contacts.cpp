@@ -198,6 +198,8 @@ void RigidContacts::finish(std::span<BodyState> bodies, double dt, double slow) 
         // Of what comes apart the next substep begins anew: the blow's force would throw it.
         const bool parts = relative_velocity(row).dot(row.normal) > 0.5 * slow;
         *points_[k].holds = row.impulse > 0;
+        points_[k].impulse = float(row.impulse);
+        points_[k].approach = float(-row.approach);
         const Vec3d impulse = row.impulse * row.normal + row.tangent_impulses[0] * row.tangents[0] +
                               row.tangent_impulses[1] * row.tangents[1];
         *points_[k].force = parts ? Vec3f(Vec3f::Zero()) : Vec3f((impulse / dt).cast<float>());

@@ -10,14 +10,16 @@ namespace filigree {
 
 /// Where a rigid body touches an obstacle or another rigid body, or may touch it within a substep.
 struct ContactPoint {
-    Index body = 0, other = kNoIndex;     ///< other: kNoIndex is an obstacle
+    Index body = 0, other = kNoIndex;     ///< other: kNoIndex is an obstacle ...
+    Index obstacle = kNoIndex;            ///< ... and this its number
     Vec3f place = Vec3f::Zero();          ///< world, m
     Vec3f normal = Vec3f::Zero();         ///< unit, from the other to the body
     float separation = 0;                 ///< m; below 0 is penetration
     Vec3f other_velocity = Vec3f::Zero(); ///< m/s, of an obstacle there
     float friction = 0, restitution = 0;
-    Vec3f* force = nullptr; ///< N, on the body: of the last substep, where the solver starts; then of this one
-    bool* holds = nullptr;  ///< whether it pushes
+    Vec3f* force = nullptr;          ///< N, on the body: of the last substep, where the solver starts; then of this one
+    bool* holds = nullptr;           ///< whether it pushes
+    float impulse = 0, approach = 0; ///< after finish: N s along the normal; m/s that they came nearer before
 };
 
 /// m outside of something at which a point of a rigid body counts as touching it: in a substep it may get there. speed:

@@ -44,8 +44,8 @@ void let_rest(SimulationState& state, double from, double until) {
     for (std::size_t b = 0; b < state.bodies.size(); ++b) {
         BodyState& body = state.bodies[b];
         if (!body.rigid || body.is_absent) continue;
-        const bool is_moved =
-            disturbed || body.is_held || state.external.pull(b, until) || state.external.push(body.actor);
+        const bool is_moved = disturbed || body.is_held || state.external.pull(b, until) ||
+                              state.external.push(state.slot_of[body.actor]);
         body.rigid->rests = !is_moved && support.carries(b);
         const bool may_sleep = body.rigid->rests && !support.is_beside_soft(b) && body.may_sleep;
         const bool is_tired = body.rigid->sleeps || grow_tired(body, state.frame_seconds());

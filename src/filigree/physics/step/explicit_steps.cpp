@@ -238,6 +238,7 @@ private:
             if (!rigid_contacts_.pushes(b)) body.rigid->centre -= 0.5 * dt * dt * gravity;
         });
         rigid_contacts_.finish(bodies_, dt, double(contact_law::smooth_speed(state_.world, float(dt))));
+        state_.contacts.events().push(rigid_contacts_.points());
         place_rigid();
     }
 
@@ -376,6 +377,7 @@ private:
                     if (state_.contacts.touches(b) && !debts_[b].has_begun()) debts_[b].before_push(body, context_);
                 });
             push_out(state_, now_, context_);
+            state_.contacts.events().keep_forces();
         }
         const Stopwatch watch(report_.other_seconds);
         kick(0.5f * dt, true);
@@ -413,8 +415,8 @@ private:
     /// But for pieces of what breaks, whose copies have to move alike.
     template <class Visit>
     void each_elastic(const Visit& visit) {
-        for (std::size_t b = 0; b < state_.actor_count; ++b)
-            if (!bodies_[b].rigid && !bodies_[b].sleeps()) visit(bodies_[b], b);
+        for (std::size_t b = 0; b < bodies_.size(); ++b)
+            if (!bodies_[b].rigid && !bodies_[b].sleeps() && !state_.is_piece(b)) visit(bodies_[b], b);
     }
 
     template <class Visit>

@@ -11,7 +11,7 @@ namespace filigree {
 
 /// A hand and the particles it holds: those near its point, by mass, so that nothing is plucked out of the surface.
 struct Grip {
-    Hand hand;
+    Hand hand; ///< of a body's slot
     Embedding region;
     Vec3f offset = Vec3f::Zero();     ///< from the region's middle to the point, when it was seized
     float stiffness = 0, damping = 0; ///< N/m, N s/m
@@ -35,8 +35,18 @@ inline float wind_push(double air_density, float inwards, float area, float mass
 
 class ExternalForces {
 public:
-    /// world: outlives this. bodies: fixed in number from here on.
+    /// world: outlives this.
     ExternalForces(const World& world, std::size_t bodies) : world_(world), pushes_(bodies), wind_(bodies) {}
+    /// So many bodies.
+    void resize(std::size_t bodies) {
+        pushes_.resize(bodies);
+        wind_.resize(bodies);
+    }
+    /// What acts on a body ends; but for the world's forces.
+    void remove_body(std::size_t body) {
+        std::erase_if(grips_, [&](const Grip& grip) { return grip.hand.body == body; });
+        pushes_[body] = wind_[body] = {};
+    }
 
     void set_grips(std::vector<Grip> grips) { grips_ = std::move(grips); }
     const std::vector<Grip>& grips() const { return grips_; }

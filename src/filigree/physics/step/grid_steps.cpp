@@ -13,31 +13,32 @@ constexpr double kMostGridSteps = 20'000; ///< a frame
 
 template <class Visit>
 void each_on_grid(SimulationState& state, const Visit& visit) {
-    for (BodyState& body : state.bodies)
-        if (body.is_on_grid) visit(body);
+    for (std::size_t slot = 0; slot < state.bodies.size(); ++slot)
+        if (state.bodies[slot].is_on_grid) visit(state.bodies[slot], slot);
 }
 
 /// Forces at the step's end, as momentum of the particles that the grid takes up.
 void push_on_grid(SimulationState& state, double now, float dt) {
     bool any = false;
-    each_on_grid(state, [&](BodyState& body) {
-        if (!state.external.acts_on(body.actor, now)) return;
+    each_on_grid(state, [&](BodyState& body, std::size_t slot) {
+        if (!state.external.acts_on(slot, now)) return;
         any = true;
         state.grid->read(body.actor, body.positions, body.velocities);
         body.forces = Vectors(body.positions.size());
     });
     if (!any) return;
     state.external.add_forces_on_grid(state.bodies, now);
-    each_on_grid(state, [&](const BodyState& body) {
-        if (state.external.acts_on(body.actor, now)) state.grid->kick(body.actor, body.forces, dt);
+    each_on_grid(state, [&](const BodyState& body, std::size_t slot) {
+        if (state.external.acts_on(slot, now)) state.grid->kick(body.actor, body.forces, dt);
     });
 }
 
 void hold_on_grid(SimulationState& state, double now, float dt) {
     if (state.world.pins.empty()) return;
     move_pins(state, now, dt, true);
-    each_on_grid(state,
-                 [&](const BodyState& body) { state.grid->move_fixed(body.actor, body.positions, body.velocities); });
+    each_on_grid(state, [&](const BodyState& body, std::size_t) {
+        state.grid->move_fixed(body.actor, body.positions, body.velocities);
+    });
 }
 
 } // namespace
@@ -60,8 +61,8 @@ void step_on_grid(SimulationState& state, double from, double until, FrameReport
         ++steps;
     }
     report.substeps = std::max(report.substeps, steps);
-    each_on_grid(state, [&](BodyState& body) {
-        note_deformation(report, body.actor, {.least_volume_ratio = grid.least_volume_ratio(body.actor)});
+    each_on_grid(state, [&](BodyState& body, std::size_t slot) {
+        note_deformation(report, slot, {.least_volume_ratio = grid.least_volume_ratio(body.actor)});
         grid.read(body.actor, body.positions, body.velocities);
     });
 }

@@ -27,6 +27,8 @@ void write(ByteWriter& out, const RigidMotion& motion) {
     write(out, motion.centre);
     write(out, motion.move);
     write(out, motion.angle);
+    const Eigen::Matrix4d start = motion.start.matrix();
+    out.array(std::span(start.data(), std::size_t(start.size())));
 }
 
 void write(ByteWriter& out, const HalfSpace& ground) {
@@ -132,16 +134,6 @@ std::uint64_t hash_of(const World& world) {
     return hash_of(std::move(out));
 }
 
-std::uint64_t hash_of(std::span<const Actor> actors) {
-    ByteWriter out;
-    for (const Actor& actor : actors) {
-        write(out, *actor.body);
-        out.value(std::uint64_t(actor.fracture != nullptr));
-        if (actor.fracture) write(out, *actor.fracture);
-    }
-    return hash_of(std::move(out));
-}
-
 std::uint64_t hash_of(const StepOptions& o) {
     ByteWriter out;
     out.value(o.frames_per_second);
@@ -153,14 +145,30 @@ std::uint64_t hash_of(const StepOptions& o) {
 
 } // namespace
 
-MadeFor made_for(const World& world, std::span<const Actor> actors, const StepOptions& options) {
-    return {hash_of(actors), hash_of(world), hash_of(options)};
+MadeFor made_for(const World& world, const StepOptions& options) {
+    return {.bodies = 0, .world = hash_of(world), .options = hash_of(options)};
+}
+
+std::uint64_t made_of(const Actor& actor) {
+    ByteWriter out;
+    write(out, *actor.body);
+    out.value(std::uint64_t(actor.fracture != nullptr));
+    if (actor.fracture) write(out, *actor.fracture);
+    return hash_of(std::move(out));
+}
+
+std::uint64_t made_of_all(std::span<const Index> slots, std::span<const std::uint64_t> actors) {
+    ByteWriter out;
+    out.array(slots);
+    out.array(actors);
+    return hash_of(std::move(out));
 }
 
 Status check_same(const MadeFor& saved, const MadeFor& here) {
     const auto other = [](const char* what) { return Error{ErrorCode::mismatch, what}; };
     if (saved.bodies != here.bodies)
-        return other("The saved state is of other bodies; resume it with the scene it was saved from.");
+        return other("The saved state is of other bodies than there are now: of another scene, or some were added or "
+                     "removed in between; resume it with the bodies that there were when it was saved.");
     if (saved.world != here.world)
         return other("The saved state is of another world (gravity, wind, obstacles, pins, forces or friction differ); "
                      "resume it with the world it was saved from.");

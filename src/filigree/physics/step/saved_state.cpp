@@ -9,8 +9,12 @@ namespace filigree {
 
 namespace {
 
-// The name of the format, its version last. C: contacts are pairs of one kind.
+// The name of the format, its version last. C: contacts are pairs of one kind; obstacles that were set, and what
+// touched in the last frame.
 constexpr std::uint64_t kMagic = 0x43455441'54534c46; // "FLSTATEC"
+static_assert(sizeof(SetMotion) == sizeof(std::uint64_t) + 26 * sizeof(double), "padding would be saved");
+static_assert(sizeof(ContactEvents::PairMemory) == 2 * sizeof(std::uint64_t) + 2 * sizeof(Index) + 2 * sizeof(Vec3f),
+              "padding would be saved");
 static_assert(sizeof(Contacts::CandidateMemory) == 4 * sizeof(Index) + 4 * sizeof(Vec3f) + sizeof(Vec3d),
               "padding would be saved");
 static_assert(sizeof(Contacts::PairMemory) == 8 * sizeof(Index), "padding would be saved");
@@ -88,6 +92,7 @@ void write_contacts(ByteWriter& writer, const Contacts::Memory& contacts) {
     writer.array(std::span(contacts.pairs));
     writer.array(std::span(contacts.candidates));
     writer.array(std::span(contacts.recovers));
+    writer.array(std::span(contacts.touched));
 }
 
 Contacts::Memory read_contacts(ByteReader& reader) {
@@ -97,6 +102,7 @@ Contacts::Memory read_contacts(ByteReader& reader) {
     contacts.pairs = reader.array<Contacts::PairMemory>();
     contacts.candidates = reader.array<Contacts::CandidateMemory>();
     contacts.recovers = reader.array<std::uint8_t>();
+    contacts.touched = reader.array<ContactEvents::PairMemory>();
     return contacts;
 }
 
@@ -108,6 +114,7 @@ std::string write_saved_state(const SavedState& state) {
     for (const std::uint64_t hash : {state.made_for.bodies, state.made_for.world, state.made_for.options})
         writer.value(hash);
     writer.value(state.frame);
+    writer.array(std::span(state.set_motions));
     writer.value(std::uint64_t(state.bodies.size()));
     for (const SavedBody& body : state.bodies) write_body(writer, body);
     write_contacts(writer, state.contacts);
@@ -137,6 +144,7 @@ Result<SavedState> read_saved_state(std::string_view bytes) {
     for (std::uint64_t* hash : {&state.made_for.bodies, &state.made_for.world, &state.made_for.options})
         *hash = reader.value<std::uint64_t>();
     state.frame = reader.value<std::uint64_t>();
+    state.set_motions = reader.array<SetMotion>();
     state.bodies.resize(reader.count(sizeof(std::uint64_t)));
     for (SavedBody& body : state.bodies) body = read_body(reader);
     state.contacts = read_contacts(reader);

@@ -5,6 +5,7 @@
 #include "filigree/physics/breaking/cracks.h"
 #include "filigree/physics/contact/contact.h"
 #include "filigree/physics/step/made_for.h"
+#include "filigree/physics/step/set_motion.h"
 
 #include <string>
 #include <string_view>
@@ -22,6 +23,7 @@ struct SavedBody {
 struct SavedState {
     MadeFor made_for;
     std::uint64_t frame = 0;
+    std::vector<SetMotion> set_motions; ///< of obstacles that were set
     std::vector<SavedBody> bodies;
     Contacts::Memory contacts;
     std::string grid;                ///< mpm::Bodies::state

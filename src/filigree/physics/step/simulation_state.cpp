@@ -32,12 +32,36 @@ bool restore_pose(RigidPose& pose, const RigidPose& saved) {
     return true;
 }
 
+bool is_sound(const ContactEvents::PairMemory& pair, const SimulationState& state) {
+    const std::size_t actors = state.slot_of.size(), others = pair.is_body ? actors : state.world.obstacles.size();
+    return pair.body < actors && pair.other < others && pair.place.allFinite() && pair.normal.allFinite();
+}
+
+/// Those that were not set go as the world was made.
+bool restore_obstacles(SimulationState& state, const std::vector<SetMotion>& saved) {
+    const auto sound = [&](const SetMotion& set) { return is_sound(set, state.world.obstacles.size()); };
+    if (!std::ranges::all_of(saved, sound)) return false;
+    std::vector<std::size_t> changed;
+    for (const SetMotion& set : state.set_motions) {
+        state.world.obstacles[set.obstacle].motion = state.made_motions[set.obstacle];
+        changed.push_back(set.obstacle);
+    }
+    for (const SetMotion& set : saved) {
+        state.world.obstacles[set.obstacle].motion = motion_of(set, state.world.obstacles[set.obstacle]);
+        changed.push_back(set.obstacle);
+    }
+    state.set_motions = saved;
+    for (const std::size_t obstacle : changed) state.contacts.set_obstacle(obstacle, false);
+    return true;
+}
+
 } // namespace
 
 SavedState save_state(const SimulationState& state) {
     SavedState saved;
     saved.made_for = state.made_for;
     saved.frame = state.frame;
+    saved.set_motions = state.set_motions;
     for (const BodyState& body : state.bodies) saved.bodies.push_back(save_body(body));
     saved.contacts = state.contacts.memory();
     saved.grid = state.grid->state();
@@ -47,8 +71,9 @@ SavedState save_state(const SimulationState& state) {
 
 Status restore_state(SimulationState& state, SavedState saved) {
     const Error damaged{ErrorCode::bad_file, "The saved state is damaged; start the simulation anew."};
-    const Error other{ErrorCode::mismatch,
-                      "The saved state is of other bodies; resume it with the scene it was saved from."};
+    const Error other{
+        ErrorCode::mismatch,
+        "The saved state is of other bodies; resume it with the bodies that there were when it was saved."};
     if (saved.bodies.size() != state.bodies.size() || saved.cracks.size() != state.cracks.size()) return other;
     for (std::size_t c = 0; c < saved.cracks.size(); ++c)
         if (!state.cracks[c].set_memory(saved.cracks[c], state.bodies)) return damaged;
@@ -71,6 +96,9 @@ Status restore_state(SimulationState& state, SavedState saved) {
         if (from.hit.pushed.other >= double(state.bodies.size())) return damaged;
         body.hit = from.hit;
     }
+    for (const ContactEvents::PairMemory& pair : saved.contacts.touched)
+        if (!is_sound(pair, state)) return damaged;
+    if (!restore_obstacles(state, saved.set_motions)) return damaged;
     if (!state.grid->restore_state(saved.grid)) return other;
     for (BodyState& body : state.bodies)
         if (body.is_on_grid) state.grid->read(body.actor, body.positions, body.velocities);

@@ -9,32 +9,44 @@
 #include "filigree/physics/step/external_forces.h"
 #include "filigree/physics/step/made_for.h"
 #include "filigree/physics/step/saved_state.h"
+#include "filigree/physics/step/set_motion.h"
+
+#include <map>
 
 namespace filigree {
 
 struct SimulationState {
-    /// body_count: with pieces.
-    SimulationState(World the_world, std::size_t body_count, std::size_t the_actor_count,
-                    const StepOptions& the_options, const MadeFor& what_for)
-        : world(std::move(the_world)), options(the_options), actor_count(the_actor_count), made_for(what_for),
-          contacts(world, the_actor_count, the_options.contacts_between_bodies, the_options.contacts_within_bodies),
-          external(world, body_count) {}
+    /// body_count: of the actors and all pieces that there are at first.
+    SimulationState(World the_world, std::size_t body_count, std::size_t actor_count, const StepOptions& the_options)
+        : world(std::move(the_world)), options(the_options), made_for(filigree::made_for(world, the_options)),
+          contacts(world, actor_count, the_options.contacts_between_bodies, the_options.contacts_within_bodies),
+          external(world, body_count) {
+        for (const Obstacle& obstacle : world.obstacles) made_motions.push_back(obstacle.motion);
+    }
     SimulationState(const SimulationState&) = delete; // contacts and external refer to the world
     SimulationState& operator=(const SimulationState&) = delete;
 
     World world;
     const StepOptions options;
-    const std::size_t actor_count;
-    const MadeFor made_for;
-    std::vector<BodyState> bodies;                           ///< of the actors, then pieces
-    std::vector<std::string> why_rigid;                      ///< of each actor: Simulation::why_rigid
+    MadeFor made_for;
+    /// Slots. At first of the actors, then pieces; what comes later takes a slot that is free, or the next.
+    std::vector<BodyState> bodies;
+    // Of each actor, by the numbers that users know; they are given once.
+    std::vector<Index> slot_of;         ///< its body's; kNoIndex: it was removed
+    std::vector<std::uint64_t> made_of; ///< made_for.h; 0: it was removed
+    std::vector<std::string> why_rigid; ///< Simulation::why_rigid
+
+    std::vector<RigidMotion> made_motions; ///< of each obstacle, as the world was made
+    std::vector<SetMotion> set_motions;    ///< of those that were set since, ascending
+    /// By body: itself, made rigid.
+    std::map<std::weak_ptr<const Body>, std::weak_ptr<const Body>, std::owner_less<>> rigid_copies;
     std::optional<std::pair<std::size_t, Vec3f>> first_lost; ///< of this frame: actor and place (lost_particles.h)
     std::vector<StartOverlap> start_overlaps;
     std::vector<Cracks> cracks; ///< of bodies that break
     Contacts contacts;
     ExternalForces external;
-    std::unique_ptr<mpm::Bodies> grid; ///< of bodies of mpm; never null
-    std::vector<Attachment> attachments;
+    std::unique_ptr<mpm::Bodies> grid;      ///< of bodies of mpm; never null
+    std::vector<Attachment> attachments;    ///< of slots; of bodies that were removed kNobody
     std::vector<std::size_t> first_tracers; ///< of each attachment: its points on the grid, where it is of such a body
     std::vector<std::vector<PieceFollower>> followers; ///< of each attachment; empty: its body does not break
     std::vector<std::vector<Vec3f>> pinned_from;       ///< of each pin: where its particles were at the start
@@ -42,7 +54,12 @@ struct SimulationState {
 
     double frame_seconds() const { return 1 / options.frames_per_second; }
     double time() const { return double(frame) * frame_seconds(); }
-    const Cracks* cracks_of(std::size_t body) const; ///< null: it does not break
+    bool has(std::size_t actor) const { return actor < slot_of.size() && slot_of[actor] != kNoIndex; }
+    /// Whether a slot, which is not free, holds a piece of a body that breaks.
+    bool is_piece(std::size_t slot) const { return slot_of[bodies[slot].actor] != slot; }
+    BodyState& body_of(std::size_t actor) { return bodies[slot_of[actor]]; }
+    const BodyState& body_of(std::size_t actor) const; ///< of one that was removed: a free slot
+    const Cracks* cracks_of(std::size_t slot) const;   ///< null: it does not break
 };
 
 /// Steps by velocity Verlet. Returns the time reached: before `until` where something is not finite any more, or the

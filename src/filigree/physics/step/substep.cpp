@@ -67,8 +67,13 @@ void note_deformation(FrameReport& report, std::size_t body, const ElasticReport
     report.most_crushed = body;
 }
 
-const Cracks* SimulationState::cracks_of(std::size_t body) const {
-    const auto found = std::ranges::find(cracks, body, &Cracks::whole);
+const BodyState& SimulationState::body_of(std::size_t actor) const {
+    static const BodyState nothing = free_slot();
+    return has(actor) ? bodies[slot_of[actor]] : nothing;
+}
+
+const Cracks* SimulationState::cracks_of(std::size_t slot) const {
+    const auto found = std::ranges::find(cracks, slot, &Cracks::whole);
     return found == cracks.end() ? nullptr : &*found;
 }
 
@@ -119,7 +124,7 @@ void make_way(SimulationState& state, double before, double now) {
         const ObstaclePoses poses(world, now);
         for (std::size_t b = 0; b < state.bodies.size(); ++b) {
             BodyState& body = state.bodies[b];
-            if (body.is_absent || body.rigid || body.actor != b) continue; // pieces have to move alike
+            if (body.is_absent || body.rigid || state.is_piece(b)) continue; // they have to move alike
             if (std::ranges::any_of(body.fixed, [](std::uint8_t fixed) { return fixed != 0; })) continue;
             for (int pass = 0; pass < kPasses; ++pass) {
                 const Vec3f out = way_out(body, o, poses);
