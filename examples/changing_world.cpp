@@ -28,7 +28,21 @@ std::shared_ptr<const Body> body_of(const Mesh& mesh, std::string_view material,
     return std::make_shared<const Body>(make_body(mesh, named.material, options, context).value());
 }
 
-double highest(const Vectors& positions) { return double(*std::ranges::max_element(positions.y)); }
+/// Those within so many metres of the lowest one.
+std::vector<Index> lowest_particles(const Body& body, float height) {
+    float least = body.rest[0].y();
+    for (Index i = 0; i < body.particle_count(); ++i) least = std::min(least, body.rest[i].y());
+    std::vector<Index> found;
+    for (Index i = 0; i < body.particle_count(); ++i)
+        if (body.rest[i].y() < least + height) found.push_back(i);
+    return found;
+}
+
+bool is_below(const Vectors& positions, float height) {
+    for (std::size_t i = 0; i < positions.size(); ++i)
+        if (positions[i].y() > height) return false;
+    return true;
+}
 
 } // namespace
 
@@ -39,10 +53,11 @@ int main() {
     constexpr std::size_t kPlate = 1;
 
     World world;
-    world.obstacles = {box({0, -0.05, 0}, {2, 0.1, 1}), box({-1.3, 0.1, 0}, {0.1, 0.2, 1})};
+    world.obstacles = {box({0, -0.05, 0}, {2, 0.1, 1}), box({-0.3, 0.15, -0.8}, {1.1, 0.25, 0.1})};
+    world.pins.push_back({0, lowest_particles(*target, 0.05f), {}});
     Actor stands;
     stands.body = target;
-    stands.placement.translation() = Vec3d(0.5, 0.17, 0);
+    stands.placement.translation() = Vec3d(0.6, 0.17, 0);
     Simulation simulation = Simulation::create(world, {stands}, {}, context).value();
 
     std::set<std::size_t> stones;
@@ -57,7 +72,7 @@ int main() {
         }
         if (frame >= 150) { // where the plate shall be at the end of the frame
             Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-            pose.translation().x() = std::min(2.5, 0.02 * (frame - 149));
+            pose.translation().z() = std::min(1.5, 0.015 * (frame - 149));
             simulation.move_obstacle(kPlate, pose).value();
         }
         simulation.advance(context).value();
@@ -68,7 +83,7 @@ int main() {
                         event.impulse);
         }
         std::erase_if(stones, [&](std::size_t number) {
-            if (highest(simulation.positions(number)) > -0.5) return false;
+            if (!is_below(simulation.positions(number), -0.5f)) return false;
             simulation.remove_body(number).value();
             ++lost;
             return true;

@@ -12,10 +12,12 @@ crate = filigree.Body(filigree.make("wavy-cube", resolution=12), "stone", partic
 target = filigree.Body(filigree.make("wavy-sphere", resolution=12), "jelly", particles=400, size=0.3)
 
 table = filigree.Obstacle.box((0, -0.05, 0), (2, 0.1, 1), friction=0.4)
-sweeper = filigree.Obstacle.box((-1.3, 0.1, 0), (0.1, 0.2, 1), friction=0.2)
-TABLE, SWEEPER = 0, 1
-simulation = filigree.Simulation([filigree.Actor(target, move=(0.5, 0.17, 0))], obstacles=[table, sweeper])
-TARGET = 0
+sweeper = filigree.Obstacle.box((-0.3, 0.15, -0.8), (1.1, 0.25, 0.1), friction=0.2)
+foot = numpy.flatnonzero(target.rest[:, 1] < target.rest[:, 1].min() + 0.05)
+TABLE, SWEEPER, TARGET = 0, 1, 0
+simulation = filigree.Simulation(
+    [filigree.Actor(target, move=(0.6, 0.17, 0))], obstacles=[table, sweeper], pins=[filigree.Pin(TARGET, foot)]
+)
 
 # %% [markdown]
 # ## The loop
@@ -31,7 +33,7 @@ for frame in range(300):
         crates.append(simulation.add_body(thrown))
 
     if frame >= 150:  # sweep: where it shall be at the end of the frame
-        simulation.move_obstacle(SWEEPER, move=(min(2.5, (frame - 149) * 0.02), 0, 0))
+        simulation.move_obstacle(SWEEPER, move=(0, 0, min(1.5, (frame - 149) * 0.015)))
 
     simulation.step()
 
@@ -61,10 +63,10 @@ assert all(hit["impulse"] > 0 for hit in hits)
 # What a ray meets first, as a click of the mouse would: the point on the body at rest is what a hand seizes.
 
 # %%
-middle = simulation.positions(TARGET).mean(0)
-hit = simulation.cast_ray(middle + [0, 2, 0], (0, -1, 0))
-if hit and hit["body"] == TARGET:
-    lift = filigree.Hand(TARGET, hit["rest"], hit["place"] + [0, 0.3, 0])
-    simulation.set_hands([lift])
-    simulation.step(40)
-    assert simulation.positions(TARGET).mean(0)[1] > middle[1] + 0.05
+hit = simulation.cast_ray((0.6, 2, 0), (0, -1, 0))
+assert hit["body"] == TARGET
+simulation.set_hands([filigree.Hand(TARGET, hit["rest"], hit["place"] + [0, 0.2, 0])])
+simulation.step(60)
+lifted = simulation.cast_ray((0.6, 2, 0), (0, -1, 0))
+print(f"the target's top at {hit['place'][1]:.2f} m was lifted to {lifted['place'][1]:.2f} m")
+assert lifted["place"][1] > hit["place"][1] + 0.03

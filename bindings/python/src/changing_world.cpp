@@ -22,7 +22,7 @@ std::vector<std::string> doubts_of(const PySimulation& self, const Actor& actor,
     if (!weight.empty()) sentences.push_back(name + " " + weight);
     std::vector<Actor> there;
     for (const std::optional<PyBody>& body : self.bodies)
-        if (body) there.push_back({.body = body->body, .placement = {}, .velocity = {}, .spin = {}});
+        if (body) there.emplace_back().body = body->body;
     const std::string before = why_models_do_not_meet(there);
     there.push_back(actor);
     if (const std::string now = why_models_do_not_meet(there); before.empty() && !now.empty())

@@ -146,8 +146,8 @@ public:
 
     /// One more body, from now on. It touches others as body_friction and body_restitution say. Returns its number, the
     /// next. Cost: as for that body in create, and O(bodies). Errors: usage (as check_actor; a body of mpm that is
-    /// coarser than the grid that others of mpm share), cancelled; nothing has changed then. Where memory runs out on the way, the simulation may only be
-    /// destroyed.
+    /// coarser than the grid that others of mpm share), cancelled; nothing has changed then. Where memory runs out on
+    /// the way, the simulation may only be destroyed.
     Result<std::size_t> add_body(const Actor& actor, const RunContext& context);
     /// A body is gone, with its pieces and with pins, forces, hands and attachments of it; what lay on it wakes. Its
     /// number is not given again. Errors: as check_body.
