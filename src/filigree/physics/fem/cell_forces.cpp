@@ -50,7 +50,7 @@ stiffness_bound(const Factors& f, const CellShape<N>& shape, typename LaneTypes<
                         (a * shape.J * (18.0f * e * shape.J + 12.0f * q) + 4.0f * e * q * shape.J * shape.I_linear);
     const Float spread = (2.0f / 3.0f) * (norm2 - trace * trace * (1.0f / 3.0f));
     const Float along = trace * (1.0f / 3.0f) + L::square_root(spread > 0.0f ? spread : Float{});
-    const Float across = L::magnitude(q) * ((shape.I_linear + 3.0f) * 0.28867513f); // s_1 <= sqrt(I)
+    const Float across = L::magnitude(q) * L::square_root(shape.I_linear); // s_1 <= sqrt(I)
     const Float bent =
         (f.shear_ratio * kBentStiffness) * over * ((2.0f / 3.0f) * over + (16.0f / 9.0f) * (kBentFrom + over)) +
         a * ((2.0f / 3.0f) * shape.I_bent);

@@ -64,7 +64,7 @@ float stiffness_of(const cell_kernel::CellMaterial& m, const PlasticCell& cell, 
     const float squares = a * shape.linear * a * shape.linear + c2 * c2 + 2 * q * q * shape.linear +
                           a * shape.J * (18 * e * shape.J + 12 * q) + 4 * e * q * shape.J * shape.linear;
     const float along = largest_eigenvalue(trace, squares);
-    const float across = std::abs(q) * (shape.linear + 3) * 0.28867513f;
+    const float across = std::abs(q) * std::sqrt(shape.linear);
     const float over = over_bent(shape.bent);
     const float bent =
         ratio * cell_kernel::kBentStiffness * over * (2 * over / 3 + 16 * (cell_kernel::kBentFrom + over) / 9) +
