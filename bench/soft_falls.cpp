@@ -1,19 +1,22 @@
-// Every soft preset falls from 1.5 times its own height onto the ground and onto a cuboid's edge.
-//   soft_falls [--sizes 0.05,0.2,1,2] [--presets a,b] [--particles N] [--seconds S] MESH...
-// A line each: the smallest volume ratio of a cell (its mean gradient's, in any substep, and its corners', at the end
-// of a frame), in how many frames cells were inverted, energy at its most over that before the hit, and what a frame
-// costs. Ends with 1 if a cell was inverted.
+// Soft presets fall from 1.5 times their own height onto the ground and onto a cuboid's edge.
+//   soft_falls [--presets a,b:springs] [--sizes 0.05,0.2,0.5,1,2] [--onto ground,edge] [--particles N] [--seconds S]
+//   MESH...
+// Without --presets all that are soft; NAME:MODEL makes another model of one. A line a fall: the smallest volume ratio
+// of a cell at the ends of frames and in any substep, how many cells were inverted at the end of the worst frame and in
+// how many frames, the greatest stretch, energy at its most over that before the hit, substeps a frame (mean and most),
+// frames that were not stepped stably, and seconds. Then what all falls together did. Ends with 1 if a cell was
+// inverted at the end of a frame, with 2 if a mesh could not be read.
 #include "filigree/core/now_seconds.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/physics/named_materials.h"
 #include "filigree/physics/simulation.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <numbers>
 #include <sstream>
 #include <string>
@@ -23,17 +26,18 @@ namespace {
 using namespace filigree;
 
 struct Options {
-    std::vector<double> sizes = {0.05, 0.2, 1, 2}; ///< m, longest side
-    std::vector<std::string> presets;              ///< empty: all that are soft
-    std::size_t particles = 8000;
+    std::vector<double> sizes = {0.05, 0.2, 0.5, 1, 2}; ///< m, longest side
+    std::vector<std::string> presets;                   ///< empty: all that are soft
+    std::vector<std::string> onto = {"ground", "edge"};
+    std::size_t particles = CellOptions().count;
     double seconds = 0.75; ///< after the hit, and as long as a fall from the body's height takes
     std::vector<std::filesystem::path> meshes;
 };
 
-std::vector<std::string> split(const std::string& text) {
+std::vector<std::string> split(const std::string& text, char at = ',') {
     std::vector<std::string> parts;
     std::istringstream in(text);
-    for (std::string part; std::getline(in, part, ',');) parts.push_back(part);
+    for (std::string part; std::getline(in, part, at);) parts.push_back(part);
     return parts;
 }
 
@@ -47,6 +51,8 @@ Options read_options(int count, char** arguments) {
             for (const std::string& size : split(value())) options.sizes.push_back(std::atof(size.c_str()));
         } else if (name == "--presets") {
             options.presets = split(value());
+        } else if (name == "--onto") {
+            options.onto = split(value());
         } else if (name == "--particles") {
             options.particles = std::size_t(std::atol(value().c_str()));
         } else if (name == "--seconds") {
@@ -58,10 +64,36 @@ Options read_options(int count, char** arguments) {
     return options;
 }
 
+struct Preset {
+    std::string name;
+    Material material;
+};
+
 /// Wood and metal are too stiff to be stepped as elastic at most sizes.
 bool is_soft(const Material& material) {
     return (material.model == MaterialModel::fem || material.model == MaterialModel::springs) &&
            material.young_modulus < 1e8;
+}
+
+std::vector<Preset> presets_of(const Options& options) {
+    static const std::map<std::string, MaterialModel> kNames = {
+        {"fem", MaterialModel::fem}, {"springs", MaterialModel::springs}, {"meshfree", MaterialModel::meshfree}};
+    std::vector<Preset> presets;
+    if (options.presets.empty())
+        for (const NamedMaterial& named : named_materials())
+            if (is_soft(named.material)) presets.push_back({std::string(named.name), named.material});
+    for (const std::string& asked : options.presets) {
+        const std::vector<std::string> parts = split(asked, ':');
+        const auto found = std::ranges::find(named_materials(), std::string_view(parts[0]), &NamedMaterial::name);
+        const auto model = parts.size() > 1 ? kNames.find(parts[1]) : kNames.end();
+        if (found == named_materials().end() || (parts.size() > 1 && model == kNames.end())) {
+            std::fprintf(stderr, "--presets: no such preset or model: %s\n", asked.c_str());
+            std::exit(2);
+        }
+        presets.push_back({asked, found->material});
+        if (model != kNames.end()) presets.back().material.model = model->second;
+    }
+    return presets;
 }
 
 Box box_of(const Vectors& points) {
@@ -76,7 +108,7 @@ World world_of(bool has_edge, double height) {
     ground.shape = HalfSpace{};
     if (has_edge) {
         Obstacle edge;
-        const double half = height / std::sqrt(2.0); // its highest edge at the origin, along z
+        const double half = height / std::numbers::sqrt2; // its highest edge at the origin, along z
         edge.shape = Cuboid{{0, -half, 0}, {height, height, 4 * height}};
         edge.motion.centre = {0, -half, 0};
         edge.motion.angle.constant = {0, 0, std::numbers::pi / 4};
@@ -87,38 +119,13 @@ World world_of(bool has_edge, double height) {
     return world;
 }
 
-/// The smallest volume ratio at a corner of a cell; how many cells are inverted at a corner, and in the mean.
-struct Corners {
-    double least = 1;
-    std::size_t inverted = 0, inverted_means = 0;
+struct Fall {
+    double least_at_ends = 1, least = 1, stretch = 1, energy = 0; ///< volume ratios; |F| / sqrt(3); of that before
+    std::size_t most_inverted = 0, inverted_frames = 0, substeps = 0, most_substeps = 0, frames = 0;
+    double seconds = 0;
 };
-Corners corners_of(const Cells& cells, const Vectors& positions) {
-    Corners found;
-    for (const auto& corners : cells.cell_corners) {
-        std::array<Vec3d, 8> p;
-        for (std::size_t c = 0; c < 8; ++c) p[c] = positions[corners[c]].cast<double>();
-        const double cube = cells.spacing * cells.spacing * cells.spacing;
-        double least = 1;
-        Mat3d mean = Mat3d::Zero();
-        for (std::size_t c = 0; c < 8; ++c) {
-            Mat3d edges;
-            for (int axis = 0; axis < 3; ++axis) {
-                const std::size_t bit = std::size_t{1} << axis;
-                edges.col(axis) = p[c | bit] - p[c & ~bit];
-            }
-            least = std::min(least, edges.determinant() / cube);
-            mean += edges / 8;
-        }
-        found.least = std::min(found.least, least);
-        found.inverted += least <= 0 ? 1 : 0;
-        found.inverted_means += mean.determinant() <= 0 ? 1 : 0;
-    }
-    return found;
-}
 
-/// Whether all went well.
-bool fall(const std::string& preset, const std::shared_ptr<const Body>& body, const std::string& shape, double size,
-          bool has_edge, double seconds) {
+Fall fall(const std::shared_ptr<const Body>& body, bool has_edge, double seconds) {
     const RunContext context(1);
     const Box box = box_of(body->rest);
     const double height = box.size().y(), g = 9.81;
@@ -128,43 +135,65 @@ bool fall(const std::string& preset, const std::shared_ptr<const Body>& body, co
     actor.velocity = {0, -std::sqrt(2 * g * 1.5 * height), 0};
     Simulation falling =
         Simulation::create(world_of(has_edge, height), {actor}, {.automatic_rigid = false}, context).value();
-    const double start = falling.energy(context).total(), zero = start - falling.energy(context).kinetic;
-    const auto frames = std::size_t(60 * (seconds + std::sqrt(3 * height / g)));
-    double least = 1, most_energy = 0, most_stretch = 1;
-    Corners worst;
-    std::size_t bad = 0, bad_ends = 0, bad_corners = 0, substeps = 0, most_substeps = 0;
+    const double start = falling.energy(context).total(), moving = falling.energy(context).kinetic;
+    Fall found;
+    found.frames = std::size_t(60 * (seconds + std::sqrt(3 * height / g)));
     const double began = now_seconds();
-    for (std::size_t frame = 0; frame < frames; ++frame) {
+    for (std::size_t frame = 0; frame < found.frames; ++frame) {
         const FrameReport report = falling.advance(context).value();
-        const Corners corners = corners_of(body->cells, falling.positions(0));
-        least = std::min(least, double(report.least_volume_ratio));
-        most_stretch = std::max(most_stretch, double(report.most_stretch));
-        bad += report.least_volume_ratio > 0 ? 0 : 1;
-        bad_ends += corners.inverted_means > 0 ? 1 : 0;
-        bad_corners += corners.inverted > 0 ? 1 : 0;
-        worst.inverted = std::max(worst.inverted, corners.inverted);
-        worst.least = std::min(worst.least, corners.least);
-        substeps += report.substeps;
-        most_substeps = std::max<std::size_t>(most_substeps, report.substeps);
-        most_energy = std::max(most_energy, (falling.energy(context).total() - zero) / (start - zero));
+        const InvertedCells cells = falling.inverted(0);
+        found.least_at_ends = std::min(found.least_at_ends, double(cells.least));
+        found.least = std::min(found.least, double(report.least_volume_ratio));
+        found.stretch = std::max(found.stretch, double(report.most_stretch));
+        found.energy = std::max(found.energy, 1 + (falling.energy(context).total() - start) / moving);
+        found.most_inverted = std::max(found.most_inverted, cells.count);
+        found.inverted_frames += cells.count > 0 ? 1 : 0;
+        found.substeps += report.substeps;
+        found.most_substeps = std::max<std::size_t>(found.most_substeps, report.substeps);
     }
-    const double spent = now_seconds() - began;
-    std::printf("%-11s %5.2f %-14s %-6s %6.3f %4zu %4zu %7.3f %4zu %6zu %6.3f %5.2f %5zu %7.1f %7.2f %zu\n",
-                preset.c_str(), size, shape.c_str(), has_edge ? "edge" : "ground", least, bad, bad_ends, worst.least,
-                bad_corners, worst.inverted, most_energy, most_stretch, most_substeps,
-                double(substeps) / double(frames), 1e3 * spent / double(frames), frames);
+    found.seconds = now_seconds() - began;
+    return found;
+}
+
+/// All falls, or those of a preset.
+struct Sum {
+    std::size_t falls = 0, inverted = 0, inverted_in_substeps = 0, substeps = 0, frames = 0;
+    double least = 1, least_at_ends = 1, energy = 0, seconds = 0;
+    void add(const Fall& fall) {
+        ++falls;
+        inverted += fall.inverted_frames > 0 ? 1 : 0;
+        inverted_in_substeps += fall.least > 0 ? 0 : 1;
+        least = std::min(least, fall.least);
+        least_at_ends = std::min(least_at_ends, fall.least_at_ends);
+        energy = std::max(energy, fall.energy);
+        substeps += fall.substeps;
+        frames += fall.frames;
+        seconds += fall.seconds;
+    }
+    void print(const char* name) const {
+        std::printf("%-20s %5zu %8zu %11zu %7.4f %7.4f %6.3f %8.1f %7.0f\n", name, falls, inverted,
+                    inverted_in_substeps, least_at_ends, least, energy,
+                    double(substeps) / double(std::max<std::size_t>(frames, 1)), seconds);
+    }
+};
+
+void print(const Preset& preset, const std::string& shape, double size, const std::string& onto, const Fall& fall) {
+    std::printf("%-20s %-14s %5.2f %-6s %7.4f %7.4f %5zu %4zu %6.2f %6.3f %7.1f %6zu %7.1f\n", preset.name.c_str(),
+                shape.c_str(), size, onto.c_str(), fall.least_at_ends, fall.least, fall.most_inverted,
+                fall.inverted_frames, fall.stretch, fall.energy, double(fall.substeps) / double(fall.frames),
+                fall.most_substeps, fall.seconds);
     std::fflush(stdout);
-    return bad == 0;
 }
 
 } // namespace
 
 int main(int count, char** arguments) {
     const Options options = read_options(count, arguments);
-    std::printf(
-        "preset       size shape          onto    least  bad ends corners  bad  cells energy  str. steps    mean "
-        "ms/frm frames\n");
-    bool is_good = true;
+    const std::vector<Preset> presets = presets_of(options);
+    std::printf("preset               scan            size onto   at ends   least cells  bad stretch energy   steps   "
+                "most seconds\n");
+    std::map<std::string, Sum> of_preset;
+    Sum all;
     for (const auto& path : options.meshes) {
         const Result<MeshFile> file = read_mesh(path, RunContext());
         if (!file) {
@@ -173,24 +202,26 @@ int main(int count, char** arguments) {
         }
         Box box;
         for (const Vec3f& p : file->mesh.positions) box.extend(p.cast<double>());
-        for (const NamedMaterial& named : named_materials()) {
-            const std::string preset(named.name);
-            if (options.presets.empty() ? !is_soft(named.material)
-                                        : std::ranges::find(options.presets, preset) == options.presets.end())
-                continue;
+        for (const Preset& preset : presets)
             for (const double size : options.sizes) {
                 BodyOptions made{.scale = size / box.size().maxCoeff(),
                                  .cells = {.spacing = 0, .count = options.particles}};
-                Result<Body> body = make_body(file->mesh, named.material, made, RunContext());
+                Result<Body> body = make_body(file->mesh, preset.material, made, RunContext());
                 if (!body) {
                     std::fprintf(stderr, "%s: %s\n", path.c_str(), body.error().message.c_str());
-                    break;
+                    return 2;
                 }
                 const auto shared = std::make_shared<const Body>(*std::move(body));
-                for (const bool has_edge : {false, true})
-                    is_good &= fall(preset, shared, path.stem().string(), size, has_edge, options.seconds);
+                for (const std::string& onto : options.onto) {
+                    const Fall one = fall(shared, onto == "edge", options.seconds);
+                    print(preset, path.stem().string(), size, onto, one);
+                    of_preset[preset.name].add(one);
+                    all.add(one);
+                }
             }
-        }
     }
-    return is_good ? 0 : 1;
+    std::printf("\n                     falls inverted in substeps at ends   least energy    steps seconds\n");
+    for (const Preset& preset : presets) of_preset[preset.name].print(preset.name.c_str());
+    all.print("all");
+    return all.inverted > 0 ? 1 : 0;
 }

@@ -105,7 +105,7 @@ struct PlainCell {
     static double share(int m) { return std::array{0.0, 1.0, 1.0, 2.0 / 3, 1.0, 2.0 / 3, 2.0 / 3, 1.0 / 3}[m]; }
 
     using Corners = Eigen::Matrix<double, 3, 8>;
-    double energy(const Corners& x, Corners& gradient) const {
+    double energy(const Corners& x, double fraction, Corners& gradient) const {
         Corners X = Corners::Zero(), dX = Corners::Zero();
         for (int m = 1; m < 8; ++m)
             for (int c = 0; c < 8; ++c) X.col(m) += sign(m, c) * x.col(c);
@@ -121,8 +121,9 @@ struct PlainCell {
         const double J = F.determinant(), V = h * h * h;
         Mat3d cofactor;
         cofactor << F.col(1).cross(F.col(2)), F.col(2).cross(F.col(0)), F.col(0).cross(F.col(1));
-        const double over = std::max(bent - 0.02, 0.0), part = std::min(over, 0.5);      // what is bent much
-        const double crush = std::clamp(0.4 - J, 0.0, 0.4), hard = 100 * (bulk + shear); // what is crushed
+        const double over = std::max(bent - 0.02, 0.0), part = std::min(over, 0.5); // what is bent much
+        const double crush = std::clamp(0.4 - J, 0.0, 0.4),
+                     hard = 100 * (bulk + shear) * std::max(fraction, 0.5) / fraction; // what is crushed
         for (int m = 1; m < 8; ++m) {
             const double more = m == 1 || m == 2 || m == 4 ? 0 : 500 * part * part;
             dX.col(m) = V * shear * (1 - 1 / (I + 1) + more) * share(m) * X.col(m) / (16 * h * h);
@@ -147,7 +148,7 @@ double plain_energy(const Body& body, const Eigen::Matrix3Xd& x, Eigen::Matrix3X
     for (std::size_t e = 0; e < body.cells.cells.size(); ++e) {
         PlainCell::Corners corners, by_corner;
         for (int c = 0; c < 8; ++c) corners.col(c) = x.col(body.cells.cell_corners[e][c]);
-        energy += body.cells.fraction[e] * cell.energy(corners, by_corner);
+        energy += body.cells.fraction[e] * cell.energy(corners, body.cells.fraction[e], by_corner);
         for (int c = 0; c < 8; ++c)
             gradient.col(body.cells.cell_corners[e][c]) += body.cells.fraction[e] * by_corner.col(c);
     }

@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <tuple>
 
 namespace filigree {
@@ -114,6 +115,67 @@ TEST(HardStarts, ACrushedMeshfreeBodyDoesNotMeetAllOfItself) {
         ASSERT_TRUE(wild.advance(RunContext(1)).ok()); // in a second; with all pairs of points in minutes
         EXPECT_TRUE(all_finite(wild.positions(0)));
     }
+}
+
+// Far too stiff for the particles it has: 60,000 substeps a frame would be stable.
+TEST(HardStarts, StepsThatAreLongerThanIsStableAreTold) {
+    Material stiff = material(MaterialModel::fem, 1e9);
+    stiff.density = 1e-3;
+    const auto soft = box(2, 2, 2, 0.25, material(MaterialModel::fem, 1e5));
+    const auto hard = box(2, 2, 2, 0.25, stiff);
+    const StepOptions options{.frames_per_second = 60, .automatic_rigid = false};
+    Simulation slow = simulation(free_space(), {actor(soft), actor(hard, {2, 0, 0})}, options);
+    const FrameReport told = run(slow, 1);
+    EXPECT_EQ(told.substeps, kMostSubsteps);
+    EXPECT_EQ(told.unstable_substeps, kMostSubsteps);
+    EXPECT_EQ(told.unstable_body, 1u);
+    Simulation quick = simulation(free_space(), {actor(soft), actor(hard, {2, 0, 0})},
+                                  {.frames_per_second = 2000, .automatic_rigid = false});
+    const FrameReport fine = run(quick, 1);
+    EXPECT_LT(fine.substeps, kMostSubsteps);
+    EXPECT_EQ(fine.unstable_substeps, 0u);
+}
+
+// One crushed cell is stiff. Damping it for as long as the rest would ask for steps as short as its squared frequency
+// says, and to damp the rest for less time would not be what was asked for.
+TEST(HardStarts, ACrushedCellDoesNotShortenStepsByItsDamping) {
+    Material jelly = material(MaterialModel::fem, 1e7);
+    const auto substeps = [&](double seconds, bool is_crushed) {
+        jelly.internal_damping = seconds;
+        Simulation one = simulation(free_space(), {actor(box(6, 6, 6, 0.1, jelly))},
+                                    {.automatic_rigid = false});
+        Vectors positions = one.positions(0);
+        for (std::size_t i = 0; i < positions.size() && is_crushed; ++i) // all corners at x = 0
+            if (positions.x[i] < 0.05f) positions.x[i] = 0.09f;
+        EXPECT_TRUE(one.set_positions(0, positions).ok());
+        return run(one, 1).substeps;
+    };
+    const double elastic = double(substeps(0, true)) / substeps(0, false);
+    const double damped = double(substeps(5e-4, true)) / substeps(5e-4, false);
+    EXPECT_GT(elastic, 3);
+    EXPECT_LT(damped, 1.5 * elastic); // and not its square
+}
+
+// A slow swing loses what Kelvin and Voigt say: the amplitude by exp(-omega^2 tau t / 2).
+TEST(HardStarts, AHeavyInternalDampingDampsSlowModesAsAsked) {
+    const double length = 1, young = 1e5, tau = 0.02;
+    Material jelly = material(MaterialModel::fem, young);
+    jelly.poisson_ratio = 0;
+    jelly.internal_damping = tau;
+    Simulation bar = simulation(free_space(), {actor(box(20, 2, 2, length / 20, jelly))}, {.automatic_rigid = false});
+    const double omega = std::numbers::pi / length * std::sqrt(young / jelly.density);
+    Vectors swing = bar.velocities(0);
+    for (std::size_t i = 0; i < swing.size(); ++i)
+        swing.x[i] = float(0.01 * std::cos(std::numbers::pi * double(bar.body(0).rest.x[i]) / length));
+    ASSERT_TRUE(bar.set_velocities(0, swing).ok());
+    const auto energy = [&] { return bar.energy(RunContext(1)).total(); };
+    const double start = energy();
+    // Over whole swings energy falls by exp(-omega^2 tau t); omega tau is 0.63, so a mode swings a little slower.
+    const double zeta = 0.5 * omega * tau, period = 2 * std::numbers::pi / (omega * std::sqrt(1 - zeta * zeta));
+    const auto frames = std::size_t(std::lround(60 * period));
+    run(bar, frames);
+    const double expected = -omega * omega * tau * double(frames) / 60;
+    EXPECT_NEAR(std::log(energy() / start), expected, 0.05 * std::abs(expected));
 }
 
 TEST(HardStarts, AHeavyBodyOnALightOne) {

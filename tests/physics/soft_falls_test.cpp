@@ -72,7 +72,10 @@ World world_of(const Fall& fall, double height) {
 class SoftFalls : public testing::TestWithParam<Fall> {};
 
 INSTANTIATE_TEST_SUITE_P(Physics, SoftFalls,
-                         testing::Values(Fall{"jelly", "torus", 2, false}, Fall{"soft-rubber", "wavy-sphere", 2, true},
+                         testing::Values(Fall{"jelly", "torus", 2, false}, Fall{"jelly", "bar", 2, true},
+                                         Fall{"soft-rubber", "penguin.obj", 2, true},
+                                         Fall{"lattice", "penguin.obj", 2, true},
+                                         Fall{"soft-rubber", "wavy-sphere", 2, true},
                                          Fall{"soft-rubber", "torus", 2, false}, Fall{"foam", "torus", 2, true},
                                          Fall{"foam", "wavy-sphere", 0.2, false}, Fall{"lattice", "torus", 2, true},
                                          Fall{"lattice", "wavy-sphere", 2, false}, Fall{"rubber", "bar", 2, false},
@@ -101,6 +104,8 @@ TEST_P(SoftFalls, NoCellIsInvertedAndNoEnergyIsGained) {
     for (int frame = 0; frame < 40; ++frame) {
         const FrameReport report = falling.advance(context).value();
         ASSERT_GT(report.least_volume_ratio, 0) << GetParam() << ", frame " << frame;
+        ASSERT_EQ(falling.inverted(0).count, 0u) << GetParam() << ", frame " << frame;
+        ASSERT_EQ(report.unstable_substeps, 0u) << GetParam() << ", frame " << frame;
         ASSERT_LT(falling.energy(context).total(), before + 0.01 * kinetic) << GetParam() << ", frame " << frame;
     }
 }

@@ -276,6 +276,28 @@ TEST_F(SceneRunTest, CellsThatAreInsideOutAtAFramesEndAreDoubted) {
     EXPECT_LT(std::abs(inversion->place.y()), 2.0f);
 }
 
+/// Waves cross its cells 60,000 times a frame.
+TEST_F(SceneRunTest, FramesThatNeedMoreSubstepsThanThereAreAreDoubted) {
+    const std::string text = "[simulation]\nframes = 2\nautomatic_rigid = false\n[world]\ngravity = [0, 0, 0]\n"
+                             "[[body]]\nname = \"plate\"\nshape = \"wavy-cube\"\namplitude = 0\nresolution = 8\n"
+                             "spacing = 0.5\ndriver = 60\nyoung_modulus = 1e9\ndensity = 1e-3\ninternal_damping = "
+                             "1e-9\n";
+    const auto run = made(text), resumed = made(text);
+    const std::string half = state_after(*run, 1);
+    ASSERT_TRUE(resumed->run->resume(half, "half"));
+    EXPECT_EQ(resumed->run->warnings(), run->run->warnings());
+    ASSERT_TRUE(run->run->advance_to(2, kOneThread));
+    const std::string said = all_of(run->run->warnings());
+    EXPECT_NE(said.find("body 'plate': 40,000 substeps of 2 frames, first in frame 1, were longer than is stable"),
+              std::string::npos)
+        << said;
+    EXPECT_NE(said.find("young_modulus (it has 1e+09), internal_damping (it has 1e-09), fewer particles or more "
+                        "frames_per_second"),
+              std::string::npos)
+        << said;
+    EXPECT_NE(run->run->broke_down().value_or("").find("frames were not stepped stably"), std::string::npos);
+}
+
 TEST_F(SceneRunTest, RepeatedBodiesShareWhatTheyAreMadeOf) {
     const std::string text = "[simulation]\nframes = 3\n[[body]]\nname = \"stone\"\nshape = \"wavy-cube\"\n"
                              "resolution = 8\nsize = 0.2\nmaterial = \"stone\"\nparticles = 27\n"

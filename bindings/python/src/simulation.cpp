@@ -113,6 +113,8 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
 py::dict said_of(const FrameReport& report) {
     py::dict said, seconds;
     said["substeps"] = report.substeps;
+    said["unstable_substeps"] = report.unstable_substeps;
+    said["unstable_body"] = report.unstable_body;
     said["contacts"] = report.contacts;
     said["deepest_contact"] = report.deepest_contact;
     said["deepest_in_matter"] = report.deepest_in_matter;
@@ -143,6 +145,11 @@ std::string doubt_of(const Simulation& simulation, const FrameReport& report) {
         return frame + std::to_string(report.clamped_particles) +
                " motions of particles were not finite or had to be limited, the first of body " +
                std::to_string(report.clamped_body) + " near " + text_of(report.clamped_at) + mend;
+    if (report.unstable_substeps > 0)
+        return frame + std::to_string(report.unstable_substeps) +
+               " substeps were longer than is stable, as a frame has " + std::to_string(kMostSubsteps) +
+               " at most; give body " + std::to_string(report.unstable_body) +
+               " a lower young_modulus or internal_damping or fewer particles, or take more frames_per_second.";
     if (report.least_volume_ratio > 0) return "";
     for (std::size_t b = 0; b < simulation.body_count(); ++b)
         if (const InvertedCells cells = simulation.inverted(b); cells.count > 0)

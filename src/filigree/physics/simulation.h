@@ -36,14 +36,18 @@ struct StepOptions {
 };
 inline constexpr std::size_t kFewestElasticCells = 8;
 
+inline constexpr unsigned kMostSubsteps = 20000; ///< a frame: what asks for more takes longer ones than are stable
+
 /// What a frame took and met.
 struct FrameReport {
-    unsigned substeps = 0;        ///< of velocity Verlet, as many as stability asked for
-    std::size_t contacts = 0;     ///< surface points that touch something, at the frame's end
-    double deepest_contact = 0;   ///< m below an obstacle's surface
-    double deepest_in_matter = 0; ///< m that a point of a surface lay inside another body, or its own
-    float least_volume_ratio = 1; ///< smallest J of all cells; 0 or less: inverted
-    std::size_t most_crushed = 0; ///< the body that has it; below 0.1 explicit steps damp it a little
+    unsigned substeps = 0;          ///< of velocity Verlet, as many as stability asked for, up to kMostSubsteps
+    unsigned unstable_substeps = 0; ///< of them longer than was stable: the motion is then not to be trusted
+    std::size_t unstable_body = 0;  ///< the body that asked for the shortest
+    std::size_t contacts = 0;       ///< surface points that touch something, at the frame's end
+    double deepest_contact = 0;     ///< m below an obstacle's surface
+    double deepest_in_matter = 0;   ///< m that a point of a surface lay inside another body, or its own
+    float least_volume_ratio = 1;   ///< smallest J of all cells; 0 or less: inverted
+    std::size_t most_crushed = 0;   ///< the body that has it; below 0.1 explicit steps damp it a little
     float most_stretch = 1;
     /// Cells and particles of plastic fem and meshfree that have flowed to seven times their length, and are elastic
     /// from there on: what flows further is mpm's.

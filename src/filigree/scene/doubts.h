@@ -30,10 +30,16 @@ struct FlowedOut {
     std::uint64_t most = 0;  ///< of them
 };
 
+/// Substeps that were longer than was stable for a body.
+struct Unstable {
+    std::uint64_t first = 0, frames = 0, substeps = 0; ///< the first such frame, and how many
+};
+
 struct BodyDoubts {
     std::optional<std::uint64_t> first_lost; ///< the first frame in which parts of the driver were held
     std::optional<Inversion> inversion;
     std::optional<FlowedOut> flowed_out;
+    std::optional<Unstable> unstable;
 };
 
 /// The first motion that was not finite or had to be limited.

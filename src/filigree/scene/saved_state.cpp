@@ -12,7 +12,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTAT9"; // ends in the version
+constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTAT10"; // ends in the version
 
 void write_totals(ByteWriter& out, const RunTotals& t) {
     for (const std::uint64_t count :
@@ -72,11 +72,13 @@ void write_doubts(ByteWriter& out, const Recording& recording) {
     for (const BodyDoubts& body : recording.doubts) {
         const Inversion inversion = body.inversion.value_or(Inversion{});
         const FlowedOut flowed = body.flowed_out.value_or(FlowedOut{});
+        const Unstable unstable = body.unstable.value_or(Unstable{});
         out.value(std::uint64_t(body.first_lost.has_value()) + 2 * std::uint64_t(body.inversion.has_value()) +
-                  4 * std::uint64_t(body.flowed_out.has_value()));
+                  4 * std::uint64_t(body.flowed_out.has_value()) + 8 * std::uint64_t(body.unstable.has_value()));
         out.value(body.first_lost.value_or(0));
-        for (const std::uint64_t count : {inversion.first, inversion.last, inversion.frames, inversion.worst,
-                                          inversion.cells, flowed.first, flowed.most})
+        for (const std::uint64_t count :
+             {inversion.first, inversion.last, inversion.frames, inversion.worst, inversion.cells, flowed.first,
+              flowed.most, unstable.first, unstable.frames, unstable.substeps})
             out.value(count);
         out.value(inversion.least);
         write_point(out, inversion.place);
@@ -94,8 +96,10 @@ void read_doubts(ByteReader& in, std::size_t bodies, Recording& recording) {
         const auto first_lost = in.value<std::uint64_t>();
         Inversion inversion;
         FlowedOut flowed;
-        for (std::uint64_t* count : {&inversion.first, &inversion.last, &inversion.frames, &inversion.worst,
-                                     &inversion.cells, &flowed.first, &flowed.most})
+        Unstable unstable;
+        for (std::uint64_t* count :
+             {&inversion.first, &inversion.last, &inversion.frames, &inversion.worst, &inversion.cells, &flowed.first,
+              &flowed.most, &unstable.first, &unstable.frames, &unstable.substeps})
             *count = in.value<std::uint64_t>();
         inversion.least = in.value<float>();
         inversion.place = read_point(in);
@@ -103,6 +107,7 @@ void read_doubts(ByteReader& in, std::size_t bodies, Recording& recording) {
         if (flags & 1) body.first_lost = first_lost;
         if (flags & 2) body.inversion = inversion;
         if (flags & 4) body.flowed_out = flowed;
+        if (flags & 8) body.unstable = unstable;
     }
     FirstLoss loss;
     const bool has_loss = in.value<std::uint64_t>() != 0;

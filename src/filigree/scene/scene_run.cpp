@@ -176,6 +176,12 @@ void SceneRun::hold_lost_of(std::size_t b) {
 void SceneRun::note_doubts(const FrameReport& report) {
     if (report.clamped_particles > 0 && !recording_.first_loss)
         recording_.first_loss = {frame(), report.clamped_body, report.clamped_at};
+    if (report.unstable_substeps > 0) {
+        std::optional<Unstable>& unstable = recording_.doubts[report.unstable_body].unstable;
+        if (!unstable) unstable = Unstable{.first = frame()};
+        ++unstable->frames;
+        unstable->substeps += report.unstable_substeps;
+    }
     if (report.least_volume_ratio <= 0)
         for (std::size_t b = 0; b < followers_.size(); ++b) {
             const InvertedCells cells = simulation_.inverted(b);
@@ -278,6 +284,7 @@ std::vector<std::string> SceneRun::warnings() const {
             sentences.push_back(fmt::format("body '{}' is moved as a rigid body: {}; automatic_rigid = false keeps it "
                                             "elastic",
                                             ready_->bodies[b].name, reason));
+        add(unstable_warning(b));
         add(inversion_warning(b));
         add(flow_warning(b));
     }
@@ -323,6 +330,21 @@ std::string SceneRun::inversion_warning(std::size_t b) const {
                        body.body->material.young_modulus);
 }
 
+std::string SceneRun::unstable_warning(std::size_t b) const {
+    const std::optional<Unstable>& unstable = recording_.doubts[b].unstable;
+    if (!unstable) return "";
+    const ReadyBody& body = ready_->bodies[b];
+    const Material& material = body.body->material;
+    const std::string damping = material.internal_damping > 0
+                                    ? fmt::format("internal_damping (it has {:.0e}), ", material.internal_damping)
+                                    : "";
+    return fmt::format("body '{}': {} substeps of {} frames, first in frame {}, were longer than is stable, as a frame "
+                       "has {} at most: take a lower young_modulus (it has {:.0e}), {}fewer particles or more "
+                       "frames_per_second",
+                       body.name, with_commas(unstable->substeps), unstable->frames, unstable->first,
+                       with_commas(kMostSubsteps), material.young_modulus, damping);
+}
+
 std::string SceneRun::flow_warning(std::size_t b) const {
     const std::optional<FlowedOut>& flowed = recording_.doubts[b].flowed_out;
     if (!flowed) return "";
@@ -348,6 +370,8 @@ std::optional<std::string> SceneRun::broke_down() const {
     if (recording_.totals.clamped_particles > 0 ||
         any([](const BodyDoubts& body) { return body.first_lost.has_value(); }))
         what.emplace_back("the motion broke down");
+    if (any([](const BodyDoubts& body) { return body.unstable.has_value(); }))
+        what.emplace_back("frames were not stepped stably");
     if (any([](const BodyDoubts& body) { return body.inversion.has_value(); }))
         what.emplace_back("cells were inside out");
     if (recording_.energy.grown > 0) what.emplace_back("energy came from nowhere");

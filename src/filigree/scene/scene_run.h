@@ -63,6 +63,7 @@ private:
     std::size_t fastest_body() const;
     Vec3f middle_of(std::size_t body) const;
     std::string place_text(const Vec3f& place) const;
+    std::string unstable_warning(std::size_t body) const;
     std::string inversion_warning(std::size_t body) const;
     std::string flow_warning(std::size_t body) const;
     std::string loss_warning() const;

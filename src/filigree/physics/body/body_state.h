@@ -49,6 +49,8 @@ struct BodyState {
     bool is_stiff = false; ///< its bounces are over before they are seen, and are what restitution says (stiff_hits.h)
     BodyHit hit;           ///< of a stiff body
     float rubbed_seconds = 0; ///< at whose frames' starts it rubbed, since it touched nothing (vibration.h)
+    float step_seconds = 0;           ///< of the substep that is being made
+    float most_push = 0;              ///< m that contact may push a particle out in it: kMostPush
     float pushed_way = 0; ///< m that particles were moved one by one, at most; a rigid body's pose has to follow
     bool is_free() const { return actor == kNobody; } ///< no body is here: it was removed
     bool sleeps() const { return is_absent || (rigid && rigid->sleeps); }
@@ -140,12 +142,17 @@ inline float yielding(const Embedding& embedding, std::size_t point, const std::
     return sum;
 }
 
+inline constexpr float kMostPush = 0.05f; ///< times the speed of the body's waves
+
 /// Moves a particle by its weight over its mass, as XPBD projects a constraint of zero compliance, but no further than
-/// `most`, m: light corners of the cell would be thrown through the others.
+/// `most`, m: light corners of the cell would be thrown through the others. Of a body that deforms, no further than it
+/// has come in this substep and kMostPush: what is moved faster than waves run turns cells inside out, and deforms them
+/// by work that nobody did.
 inline void push_particle(BodyState& body, Index particle, float weight, const Vec3f& way, const Vec3f& velocity,
                           float most) {
     const float share = weight * body.inverse_mass[particle], asked = std::abs(share) * way.norm();
-    const float moved = std::min(asked, most);
+    float moved = std::min(asked, most);
+    if (!body.rigid) moved = std::min(moved, body.most_push + body.step_seconds * std::abs(share) * velocity.norm());
     const Vec3f step = moved > 0 ? Vec3f(share * (moved / asked) * way) : Vec3f(Vec3f::Zero());
     body.positions.add(particle, step);
     body.velocities.add(particle, share * velocity);

@@ -5,8 +5,22 @@
 #include "filigree/physics/fem/plastic_cells.h"
 #include "filigree/physics/rigid/rigid_body.h"
 
+#include <algorithm>
+
 namespace filigree {
 
+ElasticReport Elasticity::damped_forces(const Vectors& positions, const InternalDamping& damping, Vectors& forces,
+                                        const RunContext& context) {
+    const ElasticReport& before = damping.before;
+    const float stiff = before.squared_frequency > damping.stiffest ? damping.stiffest / before.squared_frequency : 1;
+    const float seconds = std::max(damping.seconds * stiff, damping.crushed_at(before.least_volume_ratio));
+    Vectors ahead = positions;
+    for (const auto axis : kVectorAxes)
+        for (std::size_t i = 0; i < ahead.size(); ++i) (ahead.*axis)[i] += seconds * (damping.velocities.*axis)[i];
+    ElasticReport report = this->forces(ahead, forces, context);
+    report.damping_rate = seconds * report.squared_frequency;
+    return report;
+}
 void Elasticity::finish_substep(const Vectors&, float, const RunContext&) {}
 std::size_t Elasticity::flowed_out() const { return 0; }
 std::span<const PlasticCell> Elasticity::plastic_cells() const { return {}; }

@@ -4,6 +4,7 @@
 #include "filigree/core/run_context.h"
 #include "filigree/physics/vectors.h"
 
+#include <algorithm>
 #include <memory>
 #include <span>
 #include <string>
@@ -21,6 +22,26 @@ struct ElasticReport {
     float squared_frequency = 0;
     float least_volume_ratio = 1; ///< smallest J; 0 or less: inverted
     float most_stretch = 1;       ///< largest |F| / sqrt(3)
+    float damping_rate = 0;       ///< the same bound of internal damping's M^-1 C, 1/s
+};
+
+/// Damping inside of a body: forces at positions ahead, f(x + seconds v) = f(x) - seconds K v, which is Kelvin-Voigt's
+/// to first order. Steps dt are stable with squared_frequency dt^2 / 4 + damping_rate dt / 2 <= 1.
+struct InternalDamping {
+    static constexpr float kDampedBelow = 0.3f;
+
+    Vectors velocities; ///< m/s, less the body's rigid motion
+    float seconds = 0;
+    /// s, of a cell that is flat: from kDampedBelow of its volume on down it grows to this.
+    float crushed_seconds = 0;
+    /// 1/s^2: what is stiffer than this is damped for less time, so that it does not ask for shorter steps by damping
+    /// as well. Infinite: all is damped as long.
+    float stiffest = 0;
+    ElasticReport before; ///< that the forces before these came with
+
+    float crushed_at(float volume_ratio) const {
+        return crushed_seconds * std::clamp(1 - volume_ratio / kDampedBelow, 0.0f, 1.0f);
+    }
 };
 
 /// Elastic behaviour of one body: the body's arrays in the order its loops want, plus what is stored inside (plastic
@@ -31,6 +52,11 @@ public:
 
     /// Elastic forces, N, into `forces` (overwritten). Same bytes for any thread count and vector width.
     virtual ElasticReport forces(const Vectors& positions, Vectors& forces, const RunContext& context) = 0;
+
+    /// The same, damped. Unless a material knows which of its parts are crushed or stiff, all of it is damped as its
+    /// worst part was before.
+    virtual ElasticReport damped_forces(const Vectors& positions, const InternalDamping& damping, Vectors& forces,
+                                        const RunContext& context);
 
     /// Elastic energy, J; 0 at rest.
     virtual double energy(const Vectors& positions, const RunContext& context) const = 0;

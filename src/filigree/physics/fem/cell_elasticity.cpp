@@ -10,8 +10,9 @@ namespace filigree {
 namespace {
 
 /// The energy of one cell, J, from its corners in doubles.
-double cell_energy(const cell_kernel::CellMaterial& m, const std::array<Vec3d, 8>& corners, double fraction) {
+double cell_energy(const cell_kernel::CellMaterial& m, const std::array<Vec3d, 8>& corners, float filled) {
     std::array<Vec3d, 8> X = corners;
+    const double fraction = double(filled);
     cell_kernel::transform_corners(X);
     const double h = m.spacing, size = 4 * h;
     const double I_bent =
@@ -23,7 +24,7 @@ double cell_energy(const cell_kernel::CellMaterial& m, const std::array<Vec3d, 8
     // (J - g)^2 - (1 - g)^2 and log(I + 1) - log(4) as products: a body near rest has an energy, not rounding.
     return fraction * h * h * h *
            (shear * (0.5 * ((I - 3) - std::log1p((I - 3) / 4)) + cell_kernel::bent_energy(I_bent)) +
-            bulk * (0.5 * (J - 1) * (J + 1 - 2 * g) + cell_kernel::crush_energy(m, J)));
+            bulk * (0.5 * (J - 1) * (J + 1 - 2 * g) + cell_kernel::crush_energy(m, J, filled)));
 }
 
 class CellElasticity final : public Elasticity {
@@ -32,6 +33,11 @@ public:
 
     ElasticReport forces(const Vectors& positions, Vectors& forces, const RunContext& context) override {
         return cell_kernel::forces(plan_, positions, forces, sums_, context);
+    }
+
+    ElasticReport damped_forces(const Vectors& positions, const InternalDamping& damping, Vectors& forces,
+                                const RunContext& context) override {
+        return cell_kernel::forces(plan_, positions, forces, sums_, context, &damping);
     }
 
     double energy(const Vectors& positions, const RunContext& context) const override {

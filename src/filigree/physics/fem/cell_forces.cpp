@@ -17,6 +17,7 @@ template <int N>
 struct Extremes {
     using Float = typename LaneTypes<N>::Float;
     Float rate = {}; ///< over Factors::rate
+    Float damping = {};
     Float J = Float{} + 1e30f;
     Float I = {};
 };
@@ -26,14 +27,19 @@ struct Extremes {
 /// along s is
 ///     a s s^T + e c c^T + q M,  M_12 = s_3 ..., plus shear I / (I + 1),
 /// of which trace and Frobenius norm are polynomials in I, |c|^2 and J, and bound the largest eigenvalue (exactly,
-/// where the two others are equal, as at rest). Across s it is at most |q| s_1. Bent cells add little and are bounded
-/// roughly.
+/// where the two others are equal, as at rest). Across s it is at most |q| s_1. Bending adds to a by its shares (at
+/// most 2/3), has what it resists by itself (with r of bent_energy, shares of 500 r^2 + 2000 r I_bent), and hangs
+/// together with the rest by a |F| |B| at most. A cell that is further inverted than it may come back by in a step has
+/// no crush to come.
 template <int N>
 FILIGREE_INLINE typename LaneTypes<N>::Float
 stiffness_bound(const Factors& f, const CellShape<N>& shape, typename LaneTypes<N>::Float I,
-                typename LaneTypes<N>::Float inverse_I1, typename LaneTypes<N>::Float q) {
+                typename LaneTypes<N>::Float inverse_I1, typename LaneTypes<N>::Float q,
+                typename LaneTypes<N>::Float over, typename LaneTypes<N>::Float hard) {
     using Float = typename LaneTypes<N>::Float;
-    const Float e = 1.0f + (2 * f.crush) * crush_of<N>(shape.J - kCrushSoon);
+    using L = CellLanes<N>;
+    const Float crush = shape.J < -kCrushSoon ? Float{} : crush_of<N>(shape.J - kCrushSoon);
+    const Float e = 1.0f + (2.0f * hard) * crush;
     const Float c2 = ((dot(shape.cofactor[0], shape.cofactor[0]) + dot(shape.cofactor[1], shape.cofactor[1])) +
                       dot(shape.cofactor[2], shape.cofactor[2])) *
                      (f.inverse_size2 * f.inverse_size2) * e;
@@ -43,11 +49,64 @@ stiffness_bound(const Factors& f, const CellShape<N>& shape, typename LaneTypes<
     const Float norm2 = ((aI * aI + c2 * c2) + 2.0f * q * q * shape.I_linear) +
                         (a * shape.J * (18.0f * e * shape.J + 12.0f * q) + 4.0f * e * q * shape.J * shape.I_linear);
     const Float spread = (2.0f / 3.0f) * (norm2 - trace * trace * (1.0f / 3.0f));
-    const Float along = trace * (1.0f / 3.0f) + CellLanes<N>::square_root(spread > 0.0f ? spread : Float{});
-    const Float across = CellLanes<N>::magnitude(q) * ((shape.I_linear + 3.0f) * 0.28867513f); // s_1 <= sqrt(I)
-    const Float bent = a * (0.05f * shape.I_linear + 4.0f * shape.I_bent);
-    return (f.shear_ratio * I * inverse_I1 + CellLanes<N>::most(along, across)) + bent;
+    const Float along = trace * (1.0f / 3.0f) + L::square_root(spread > 0.0f ? spread : Float{});
+    const Float across = L::magnitude(q) * L::square_root(shape.I_linear); // s_1 <= sqrt(I)
+    const Float bent =
+        (f.shear_ratio * kBentStiffness) * over * ((2.0f / 3.0f) * over + (16.0f / 9.0f) * (kBentFrom + over)) +
+        a * ((2.0f / 3.0f) * shape.I_bent);
+    const Float both = a * (0.05f * shape.I_linear + 3.4f * shape.I_bent);
+    return f.shear_ratio * I * inverse_I1 + (L::most(L::most(along, across), bent) + both);
 }
+
+/// What forces and the bound on stiffness depend on, of N cells.
+template <int N>
+struct CellLoad {
+    using Float = typename LaneTypes<N>::Float;
+    CellShape<N> shape;
+    Float I, inverse_I1;
+    Float q;    ///< derivative of the volume's energy by J, over bulk
+    Float over; ///< r of bent_energy
+    Float hard; ///< crush_stiffness
+    FILIGREE_INLINE CellLoad(const Factors& f, const CellSums<N>& sums, Float fraction)
+        : shape(shape_of<N>(sums, f.inverse_size)) {
+        using L = CellLanes<N>;
+        I = shape.I_linear + shape.I_bent;
+        inverse_I1 = 1.0f / (I + 1.0f);
+        const Float crush = crush_of<N>(shape.J);
+        hard = f.crush * (L::most(fraction, Float{} + kLeastCrushed) / fraction);
+        q = (shape.J - f.rest_ratio) - hard * crush * crush;
+        over = L::least(L::most(shape.I_bent - kBentFrom, Float{}), Float{} + kBentMost);
+    }
+    FILIGREE_INLINE Float stiffness(const Factors& f) const {
+        const Float bound = stiffness_bound<N>(f, shape, I, inverse_I1, q, over, hard);
+        return bound <= 3e38f ? bound : Float{} + std::numeric_limits<float>::infinity();
+    }
+};
+
+/// Moves sums to where damping has forces computed. Returns the time that cells are damped by, s.
+template <int N>
+FILIGREE_INLINE typename LaneTypes<N>::Float
+look_ahead(const Factors& f, const CellLoad<N>& now, typename LaneTypes<N>::Float stiffness, const Vectors& velocities,
+           const Cells::Run& run, Index i, CellSums<N>& sums) {
+    using L = CellLanes<N>;
+    using Float = typename L::Float;
+    CellSums<N> v;
+    transform<N>(velocities, run.rows, i, v);
+    const Float usual = f.seconds * (stiffness > f.stiffest ? f.stiffest / stiffness : Float{} + 1.0f);
+    const Float flat = 1.0f - now.shape.J * (1 / InternalDamping::kDampedBelow);
+    const Float seconds = L::most(usual, f.crushed_seconds * L::least(L::most(flat, Float{}), Float{} + 1.0f));
+    Float squares = {};
+    for (int m = 1; m < 8; ++m) squares = squares + dot(v.X[m], v.X[m]);
+    const Float way = seconds * (L::square_root(squares) * f.inverse_size);
+    const Float ahead = way > kMostAhead ? seconds * (kMostAhead / way) : seconds;
+    for (int m = 1; m < 8; ++m) sums.X[m] = sums.X[m] + ahead * v.X[m];
+    return seconds;
+}
+
+struct Motion {
+    const Vectors& positions;
+    const Vectors* velocities; ///< of internal damping
+};
 
 /// What the cells on the left of a block's first corners add to them: sums over x of the right corners' forces, for
 /// y, z and both.
@@ -58,28 +117,28 @@ struct Carry {
 
 /// Forces of cells i .. i + N - 1 of a run (of which the first `count` are meant where Tail), added to corners i ..
 /// i + N - 1.
-template <int N, bool Tail>
-FILIGREE_INLINE void add_forces(const Factors& f, const Vectors& positions, const Cells::Run& run, Index i, Index count,
+template <int N, bool Damped, bool Tail>
+FILIGREE_INLINE void add_forces(const Factors& f, const Motion& motion, const Cells::Run& run, Index i, Index count,
                                 const float* fraction, float* const* sums, Carry<N>& carry, Extremes<N>& extremes) {
     using L = CellLanes<N>;
     using Float = typename L::Float;
     using Int = typename L::Int;
     CellSums<N> s;
-    transform<N>(positions, run.rows, i, s);
-    const CellShape<N> shape = shape_of<N>(s, f.inverse_size);
-    const Float I = shape.I_linear + shape.I_bent;
-    const Float inverse_I1 = 1.0f / (I + 1.0f);
-    const Float crush = crush_of<N>(shape.J);
-    const Float q = (shape.J - f.rest_ratio) - f.crush * crush * crush;
-    const Float over = L::least(L::most(shape.I_bent - kBentFrom, Float{}), Float{} + kBentMost);
-    Float stiffness = stiffness_bound<N>(f, shape, I, inverse_I1, q) +
-                      (f.shear_ratio * kBentStiffness) * (over * (over + 4.0f * (kBentFrom + over)));
-    stiffness = stiffness <= 3e38f ? stiffness : Float{} + std::numeric_limits<float>::infinity();
-
+    transform<N>(motion.positions, run.rows, i, s);
     const Float share = L::load(fraction + run.first_cell + i);
-    const Float linear = share * (I * inverse_I1) * f.shear_force;
-    const Float volume = share * q * f.volume_force;
-    const Float bending = linear + share * (kBentStiffness * f.shear_force) * (over * over);
+    CellLoad<N> load(f, s, share);
+    Float stiffness = load.stiffness(f), seconds = {};
+    const Float J = load.shape.J, I_now = load.I;
+    if constexpr (Damped) {
+        seconds = look_ahead<N>(f, load, stiffness, *motion.velocities, run, i, s);
+        load = CellLoad<N>(f, s, share);
+        stiffness = L::most(stiffness, load.stiffness(f));
+    }
+    const CellShape<N>& shape = load.shape;
+
+    const Float linear = share * (load.I * load.inverse_I1) * f.shear_force;
+    const Float volume = share * load.q * f.volume_force;
+    const Float bending = linear + share * (kBentStiffness * f.shear_force) * (load.over * load.over);
     const Float bent = bending * (2.0f / 3.0f), last = bending * (1.0f / 3.0f);
     Vectors3<N> P[8]; // derivatives of the energy by X
     P[1] = linear * s.X[1] + volume * shape.cofactor[0];
@@ -94,12 +153,14 @@ FILIGREE_INLINE void add_forces(const Factors& f, const Vectors& positions, cons
         const Int mask = L::first(count);
         for (int m = 1; m < 8; ++m) P[m] = {L::keep(mask, P[m].x), L::keep(mask, P[m].y), L::keep(mask, P[m].z)};
         extremes.rate = L::most(extremes.rate, L::keep(mask, stiffness));
-        extremes.I = L::most(extremes.I, L::keep(mask, I));
-        extremes.J = L::least(extremes.J, mask ? shape.J : extremes.J);
+        extremes.damping = L::most(extremes.damping, L::keep(mask, seconds * stiffness));
+        extremes.I = L::most(extremes.I, L::keep(mask, I_now));
+        extremes.J = L::least(extremes.J, mask ? J : extremes.J);
     } else {
         extremes.rate = L::most(extremes.rate, stiffness);
-        extremes.I = L::most(extremes.I, I);
-        extremes.J = L::least(extremes.J, shape.J);
+        extremes.damping = L::most(extremes.damping, seconds * stiffness);
+        extremes.I = L::most(extremes.I, I_now);
+        extremes.J = L::least(extremes.J, J);
     }
 
     // Along x: corner i has the left force of cell i and the right one of cell i - 1.
@@ -140,10 +201,11 @@ FILIGREE_INLINE void add_last_corner(const Cells::Run& run, float* const* sums, 
 }
 
 /// Forces of a run's cells from i on, in blocks of N and then of as few as the rest needs.
-template <int N>
-FILIGREE_INLINE void add_run(const Factors& f, const Vectors& positions, const Cells::Run& run, Index i,
+template <int N, bool Damped>
+FILIGREE_INLINE void add_run(const Factors& f, const Motion& motion, const Cells::Run& run, Index i,
                              const float* fraction, float* const* sums, Carry<N>& carry, Extremes<N>& extremes) {
-    for (; i + N <= run.count; i += N) add_forces<N, false>(f, positions, run, i, N, fraction, sums, carry, extremes);
+    for (; i + N <= run.count; i += N)
+        add_forces<N, Damped, false>(f, motion, run, i, N, fraction, sums, carry, extremes);
     const Index rest = run.count - i;
     if (rest == 0) return add_last_corner<N>(run, sums, carry);
     if constexpr (N > 4)
@@ -154,26 +216,28 @@ FILIGREE_INLINE void add_run(const Factors& f, const Vectors& positions, const C
                 half_carry.right[u] = {L::last_half(carry.right[u].x), L::last_half(carry.right[u].y),
                                        L::last_half(carry.right[u].z)};
             Extremes<N / 2> half;
-            add_run<N / 2>(f, positions, run, i, fraction, sums, half_carry, half);
+            add_run<N / 2, Damped>(f, motion, run, i, fraction, sums, half_carry, half);
             extremes.rate = L::most(extremes.rate, L::twice(half.rate));
+            extremes.damping = L::most(extremes.damping, L::twice(half.damping));
             extremes.I = L::most(extremes.I, L::twice(half.I));
             extremes.J = L::least(extremes.J, L::twice(half.J));
             return;
         }
-    add_forces<N, true>(f, positions, run, i, rest, fraction, sums, carry, extremes);
+    add_forces<N, Damped, true>(f, motion, run, i, rest, fraction, sums, carry, extremes);
 }
 
 struct ForceJob {
     const Plan& plan;
-    const Vectors& positions;
+    Motion motion;
+    Factors factors;
     Sums& sums;
     std::span<ElasticReport> reports; ///< one a slab
 };
 
-template <int N>
+template <int N, bool Damped>
 FILIGREE_INLINE void add_slabs(const ForceJob& job, std::size_t begin, std::size_t end) {
     const Plan& plan = job.plan;
-    const Factors factors(plan.material);
+    const Factors& factors = job.factors;
     for (std::size_t index = begin; index < end; ++index) {
         const Slab& slab = plan.slabs[index];
         Vectors& to = job.sums.of_parity[index % 2];
@@ -192,16 +256,18 @@ FILIGREE_INLINE void add_slabs(const ForceJob& job, std::size_t begin, std::size
                                     to.y.data() + shift + kPadding,
                                     to.z.data() + shift + kPadding};
             Carry<N> carry = {};
-            add_run<N>(factors, job.positions, run, 0, plan.fraction.data(), sums, carry, extremes);
+            add_run<N, Damped>(factors, job.motion, run, 0, plan.fraction.data(), sums, carry, extremes);
         }
         ElasticReport& report = job.reports[index];
-        float rate = 0, J = extremes.J[0], I = 0;
+        float rate = 0, damping = 0, J = extremes.J[0], I = 0;
         for (int lane = 0; lane < N; ++lane) {
             rate = std::max(rate, extremes.rate[lane]);
+            damping = std::max(damping, extremes.damping[lane]);
             J = std::min(J, extremes.J[lane]);
             I = std::max(I, extremes.I[lane]);
         }
         report.squared_frequency = rate * factors.rate;
+        report.damping_rate = damping * factors.rate;
         report.least_volume_ratio = J;
         report.most_stretch = std::sqrt(I / 3);
     }
@@ -210,22 +276,37 @@ FILIGREE_INLINE void add_slabs(const ForceJob& job, std::size_t begin, std::size
 using ForceFunction = void (*)(const ForceJob&, std::size_t, std::size_t);
 
 #if defined(FILIGREE_HAS_WIDTHS)
+template <bool Damped>
 FILIGREE_AVX512 void add_slabs_avx512(const ForceJob& job, std::size_t begin, std::size_t end) {
-    add_slabs<16>(job, begin, end);
+    add_slabs<16, Damped>(job, begin, end);
 }
+template <bool Damped>
 FILIGREE_AVX2 void add_slabs_avx2(const ForceJob& job, std::size_t begin, std::size_t end) {
-    add_slabs<8>(job, begin, end);
+    add_slabs<8, Damped>(job, begin, end);
 }
 #endif
-void add_slabs_plain(const ForceJob& job, std::size_t begin, std::size_t end) { add_slabs<4>(job, begin, end); }
+template <bool Damped>
+void add_slabs_plain(const ForceJob& job, std::size_t begin, std::size_t end) {
+    add_slabs<4, Damped>(job, begin, end);
+}
 
+template <bool Damped>
 ForceFunction force_function(int lanes) {
 #if defined(FILIGREE_HAS_WIDTHS)
-    if (lanes == 16) return add_slabs_avx512;
-    if (lanes == 8) return add_slabs_avx2;
+    if (lanes == 16) return add_slabs_avx512<Damped>;
+    if (lanes == 8) return add_slabs_avx2<Damped>;
 #endif
     assert(lanes == 4);
-    return add_slabs_plain;
+    return add_slabs_plain<Damped>;
+}
+
+Factors factors_of(const Plan& plan, const InternalDamping* damping) {
+    Factors factors(plan.material);
+    if (!damping) return factors;
+    factors.seconds = damping->seconds;
+    factors.crushed_seconds = damping->crushed_seconds;
+    factors.stiffest = damping->stiffest / factors.rate;
+    return factors;
 }
 
 /// Forces of the corners in layers [begin, end), from what the slabs have. A layer between slabs has something in both
@@ -255,14 +336,14 @@ void sum_layers(const Plan& plan, const Sums& sums, std::size_t begin, std::size
 
 } // namespace
 
-ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces, Sums& sums,
-                     const RunContext& context) {
+ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces, Sums& sums, const RunContext& context,
+                     const InternalDamping* damping) {
     static const int lanes = lane_counts().back();
-    return cell_kernel::forces(plan, positions, forces, sums, lanes, context);
+    return cell_kernel::forces(plan, positions, forces, sums, lanes, context, damping);
 }
 
 ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces, Sums& sums, int lanes,
-                     const RunContext& context) {
+                     const RunContext& context, const InternalDamping* damping) {
     assert(positions.size() == plan.cells->corners.size() && forces.size() == positions.size());
     const std::size_t layer_count = plan.layer_starts.size() - 1;
     const std::size_t needed = positions.size() + kPadding * (layer_count + 1);
@@ -270,8 +351,9 @@ ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces
         if (parity.size() != needed) parity = Vectors(needed);
 
     std::vector<ElasticReport> reports(plan.slabs.size());
-    const ForceJob job{plan, positions, sums, reports};
-    const ForceFunction add_slabs_of = force_function(lanes);
+    const Motion motion{positions, damping ? &damping->velocities : nullptr};
+    const ForceJob job{plan, motion, factors_of(plan, damping), sums, reports};
+    const ForceFunction add_slabs_of = damping ? force_function<true>(lanes) : force_function<false>(lanes);
     parallel_for(context, plan.slabs.size(), 1,
                  [&](std::size_t begin, std::size_t end) { add_slabs_of(job, begin, end); });
 
@@ -284,6 +366,7 @@ ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces
     if (!reports.empty()) report = reports[0];
     for (const ElasticReport& r : reports) {
         report.squared_frequency = std::max(report.squared_frequency, r.squared_frequency);
+        report.damping_rate = std::max(report.damping_rate, r.damping_rate);
         report.least_volume_ratio = std::min(report.least_volume_ratio, r.least_volume_ratio);
         report.most_stretch = std::max(report.most_stretch, r.most_stretch);
     }

@@ -25,9 +25,15 @@ void transform_corners(std::array<Vector, 8>& X) {
 /// stiffness grows steadily from none; below J = 0, where it is inverted, no more than there. Steps are short enough
 /// for a cell that loses kCrushSoon more.
 inline constexpr float kCrushFrom = 0.4f, kCrushStiffness = 100, kCrushSoon = 0.1f;
+/// Cells that are hardly filled stand between the surface and whole ones, whose push they have to bear: they resist
+/// crushing as if they were at least so full.
+inline constexpr float kLeastCrushed = 0.5f;
 /// Where a part of I beyond this is bending, a cell resists more as well: by shear kBentStiffness r^2, r up to
 /// kBentMost. The corners of cells that are hardly filled would be thrown through the others.
 inline constexpr float kBentFrom = 0.02f, kBentStiffness = 500, kBentMost = 0.5f;
+
+/// Damping never looks further ahead than this, of a cell's sides: forces there have little to do with those here.
+inline constexpr float kMostAhead = 0.2f;
 
 /// Energy of a cell of occupied volume V, stable where it is inverted or collapsed [Smith 2018]:
 ///     V (shear/2 (I - 3) + bulk/2 (J - rest_ratio)^2 - shear/2 log((I + 1) / 4)) less its value at rest,
@@ -42,10 +48,14 @@ struct CellMaterial {
 };
 CellMaterial cell_material(const Material& material, double spacing);
 
+/// CellMaterial::crush of a cell that is filled by a fraction.
+inline float crush_stiffness(const CellMaterial& m, float fraction) {
+    return m.crush * (std::max(fraction, kLeastCrushed) / fraction);
+}
 /// Of a cell that is crushed, over V bulk.
-inline double crush_energy(const CellMaterial& m, double J) {
+inline double crush_energy(const CellMaterial& m, double J, float fraction) {
     const double most = double(kCrushFrom), r = std::clamp(most - J, 0.0, most);
-    return double(m.crush) * (r * r * r / 3 + most * most * std::max(-J, 0.0));
+    return double(crush_stiffness(m, fraction)) * (r * r * r / 3 + most * most * std::max(-J, 0.0));
 }
 /// Of a cell that is bent, by the part of I that is bending, over V shear.
 inline double bent_energy(double I_bent) {
@@ -77,14 +87,15 @@ struct Sums {
     std::array<Vectors, 2> of_parity;
 };
 
-/// Forces, N, overwritten. Same bytes for any thread count and any processor. Cost: 10 ns a cell.
-ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces, Sums& sums,
-                     const RunContext& context);
+/// Forces, N, overwritten. Same bytes for any thread count and any processor. Cost: 10 ns a cell, twice as much where
+/// they are damped (null: they are not).
+ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces, Sums& sums, const RunContext& context,
+                     const InternalDamping* damping = nullptr);
 
 /// Cells at a time that this processor has an implementation for, ascending; forces takes the fastest.
 std::span<const int> lane_counts();
 /// The same by one of them, so that tests can hold them against each other.
 ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces, Sums& sums, int lanes,
-                     const RunContext& context);
+                     const RunContext& context, const InternalDamping* damping = nullptr);
 
 } // namespace filigree::cell_kernel

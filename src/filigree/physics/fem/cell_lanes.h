@@ -174,6 +174,8 @@ struct Factors {
     float rate;         ///< from an eigenvalue of the energy density in F, over bulk, to 1/s^2
     float shear_force;  ///< of X: shear h / 16
     float volume_force; ///< of the cofactor: bulk h^3 / (4 h)^3
+    // Of internal damping, s; stiffest: of an eigenvalue, over bulk.
+    float seconds = 0, crushed_seconds = 0, stiffest = 0;
     explicit Factors(const CellMaterial& m) {
         const float size = 4 * m.spacing;
         inverse_size = 1 / size;

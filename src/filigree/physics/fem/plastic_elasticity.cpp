@@ -43,33 +43,39 @@ float largest_eigenvalue(float trace, float squares) {
 
 /// cell_kernel's crush, and the first derivative of the volume's energy density over `bulk`.
 float crush_of(float J) { return std::clamp(cell_kernel::kCrushFrom - J, 0.0f, cell_kernel::kCrushFrom); }
-float pressure_of(const cell_kernel::CellMaterial& m, float J) {
+float pressure_of(const cell_kernel::CellMaterial& m, float J, float hard) {
     const float crush = crush_of(J);
-    return J - m.rest_ratio - m.crush * crush * crush;
+    return J - m.rest_ratio - hard * crush * crush;
 }
 
 float over_bent(float I_bent) { return std::clamp(I_bent - cell_kernel::kBentFrom, 0.0f, cell_kernel::kBentMost); }
 
 /// A bound on the second derivative of the energy density over `bulk`: cell_kernel's in the elastic sums, brought back
 /// through what the cell keeps. Bending at rest couples sums of equal shear stiffness.
-float stiffness_of(const cell_kernel::CellMaterial& m, const PlasticCell& cell, const ElasticShape& shape, float size) {
+float stiffness_of(const cell_kernel::CellMaterial& m, const PlasticCell& cell, const ElasticShape& shape, float size,
+                   float hard) {
     const float I = shape.linear + shape.bent, ratio = m.shear / m.bulk;
-    const float e = 1 + 2 * m.crush * crush_of(shape.J - cell_kernel::kCrushSoon), q = pressure_of(m, shape.J);
+    constexpr float kSoon = cell_kernel::kCrushSoon;
+    const float e = 1 + 2 * hard * (shape.J < -kSoon ? 0 : crush_of(shape.J - kSoon)),
+                q = pressure_of(m, shape.J, hard);
     const float c2 = e * shape.cofactors.squaredNorm() / (size * size * size * size);
     const float a = 2 * ratio / ((I + 1) * (I + 1));
     const float trace = a * shape.linear + c2;
     const float squares = a * shape.linear * a * shape.linear + c2 * c2 + 2 * q * q * shape.linear +
                           a * shape.J * (18 * e * shape.J + 12 * q) + 4 * e * q * shape.J * shape.linear;
     const float along = largest_eigenvalue(trace, squares);
-    const float across = std::abs(q) * (shape.linear + 3) * 0.28867513f;
-    const float over = over_bent(shape.bent),
-                over_stiffness = cell_kernel::kBentStiffness * over * (over + 4 * (cell_kernel::kBentFrom + over));
-    const float shear = ratio * (I / (I + 1) + over_stiffness), bent = a * (0.05f * shape.linear + 4 * shape.bent);
+    const float across = std::abs(q) * std::sqrt(shape.linear);
+    const float over = over_bent(shape.bent);
+    const float bent =
+        ratio * cell_kernel::kBentStiffness * over * (2 * over / 3 + 16 * (cell_kernel::kBentFrom + over) / 9) +
+        2 * a * shape.bent / 3;
+    const float both = a * (0.05f * shape.linear + 3.4f * shape.bent);
+    const float shear = ratio * I / (I + 1);
     const Mat3f metric = cell.inverse * cell.inverse.transpose();
     float at_rest = 0;
     for (const Vec3f& b : cell.bent) at_rest += b.squaredNorm();
-    return (shear + std::max(along, across) + bent) * largest_eigenvalue(metric.trace(), metric.squaredNorm()) +
-           (shear + bent) * (at_rest + std::sqrt(at_rest));
+    return (shear + std::max({along, across, bent}) + both) * largest_eigenvalue(metric.trace(), metric.squaredNorm()) +
+           (shear + bent + both) * (at_rest + std::sqrt(at_rest));
 }
 
 class PlasticElasticity final : public Elasticity {
@@ -165,8 +171,10 @@ private:
         const PlasticCell& plastic = plastic_[cell];
         const float I = shape.linear + shape.bent, h = material_.spacing;
         const float volume = body_.cells.fraction[cell] * h * h * h;
+        const float hard = cell_kernel::crush_stiffness(material_, body_.cells.fraction[cell]);
         const float by_sums = volume * material_.shear * I / (I + 1) / (size_ * size_);
-        const float by_volume = volume * material_.bulk * pressure_of(material_, shape.J) / (size_ * size_ * size_);
+        const float by_volume =
+            volume * material_.bulk * pressure_of(material_, shape.J, hard) / (size_ * size_ * size_);
         const float over = over_bent(shape.bent);
         const float by_bent =
             by_sums + volume * material_.shear * cell_kernel::kBentStiffness * over * over / (size_ * size_);
@@ -190,7 +198,7 @@ private:
                 }
         for (int corner = 0; corner < 8; ++corner) pushes_[cell][corner] = -P[corner];
         const float rate = 1.0001f * 4 * material_.bulk / (material_.density * h * h);
-        const float frequency = rate * stiffness_of(material_, plastic, shape, size_);
+        const float frequency = rate * stiffness_of(material_, plastic, shape, size_, hard);
         take_worse(report, {frequency <= 3e38f ? frequency : std::numeric_limits<float>::infinity(), shape.J,
                             std::sqrt(I / 3)});
     }
@@ -207,7 +215,8 @@ private:
         const double J = X[1].cast<double>().dot(X[2].cast<double>().cross(X[4].cast<double>())) / (size * size * size);
         return double(body_.cells.fraction[cell]) * h * h * h *
                (double(material_.shear) * (0.5 * ((I - 3) - std::log1p((I - 3) / 4)) + cell_kernel::bent_energy(bent)) +
-                double(material_.bulk) * (0.5 * (J - 1) * (J + 1 - 2 * g) + cell_kernel::crush_energy(material_, J)));
+                double(material_.bulk) * (0.5 * (J - 1) * (J + 1 - 2 * g) +
+                                          cell_kernel::crush_energy(material_, J, body_.cells.fraction[cell])));
     }
 
     const Body& body_;

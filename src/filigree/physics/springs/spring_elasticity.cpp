@@ -35,7 +35,8 @@ namespace {
 constexpr float kVolumeFrom = 0.3f, kVolumeStiffness = 1.5f;
 // That alone does not stop what hits hard. So a cell as a whole resists as well, by its mean gradient's volume ratio J:
 // below kCrushFrom by kCrushStiffness E V r^2, r = kCrushFrom - J, where it is inverted no more than where it is flat.
-// Steps are short enough for a cell that loses kCrushSoon more.
+// Steps are short enough for a cell that loses kCrushSoon more. Cells that are hardly filled resist as whole ones: they
+// stand between the surface and those, whose push they have to bear.
 constexpr float kCrushFrom = 0.4f, kCrushStiffness = 50, kCrushSoon = 0.1f;
 constexpr float kPressedFrom = 0.5f;                ///< volume ratio at a corner below which a cell is looked at
 constexpr float kLargestSpring = 1e15f;             // m: positions beyond are not fit for explicit steps
@@ -192,7 +193,7 @@ private:
             std::array<Vec3f, 8> p;
             for (std::size_t k = 0; k < 8; ++k) p[k] = positions[body_.cells.cell_corners[c][k]];
             const MeanVolume volume(p, inverse_cube_);
-            if (volume.ratio < kCrushFrom + kCrushSoon) visit(volume, here, crush_stiffness_ * body_.cells.fraction[c]);
+            if (volume.ratio < kCrushFrom + kCrushSoon) visit(volume, here, crush_stiffness_);
         }
     }
 

@@ -23,6 +23,7 @@ constexpr std::size_t kAwakeGrain = 16, kElasticGrain = 4; // bodies
 constexpr double kSafety = 0.9;      ///< part of the stable step that is used: it changes while a step is made
 constexpr double kLeastSubsteps = 2; ///< a frame; with one, large motions gain energy
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+constexpr double kBarelyLonger = 1.01;    ///< times the stable step: still stable, as kSafety has it
 constexpr double kShortestOpening = 0.25; ///< of the stable step: cracks that open faster are followed less well
 /// Large vibrations that steps hardly follow draw energy from them: tiny bodies in free flight took in a hundred times
 /// what they had (HardStarts.ANoisyBodyGainsNoEnergy). A little internal damping takes it away again. Accelerations
@@ -31,39 +32,37 @@ constexpr float kCalm = 0.05f;       ///< that change, as a speed, in parts of t
 constexpr float kNoisy = 0.15f;      ///< ... from which on damping is full
 constexpr float kNoisyDelay = 0.05f; ///< substeps
 /// A few crushed cells are little of a large body; forces change there as fast as steps follow.
-constexpr float kCrushedFrom = 0.3f;  ///< of a cell, of its volume at rest: damping begins, and grows ...
-constexpr float kCrushedDelay = 0.5f; ///< ... to this where a cell is flat, substeps
+constexpr float kCrushedDelay = 0.5f; ///< substeps, where a cell is flat (InternalDamping::kDampedBelow)
 /// Clay that is thrown at the ground would throw bits off, but for damping of waves of a few spacings [von Neumann
 /// 1950].
-constexpr float kFlowingDelay = 0.25f;    ///< of the time that a wave takes across a spacing
-constexpr float kRubbingDelay = 0.25f;    ///< substeps: of what slides along something (calm_rubbing): short waves
-constexpr float kLightDelay = 0.5f;       ///< substeps: of light corners, which would swing for ever ...
-constexpr float kFreeWay = 0.05f;         ///< spacings a substep: ... as far as they move faster
-constexpr double kMostDeforming = 0.5;    ///< spacings a substep, between particles of one body
-constexpr unsigned kMostSubsteps = 20000; ///< a frame
-constexpr double kUsualSubsteps = 256;    ///< a frame: what the first forces of a frame take for the step before
+constexpr float kFlowingDelay = 0.25f; ///< of the time that a wave takes across a spacing
+constexpr float kRubbingDelay = 0.25f; ///< substeps: of what slides along something (calm_rubbing): short waves
+constexpr float kLightDelay = 0.5f;    ///< substeps: of light corners, which would swing for ever ...
+constexpr float kFreeWay = 0.05f;      ///< spacings a substep: ... as far as they move faster
+constexpr double kMostDeforming = 0.5; ///< spacings a substep, between particles of one body
+constexpr double kStifferDamped = 2;   ///< times the squared frequency at rest: what is stiffer is damped for less time
+constexpr double kUsualSubsteps = 256; ///< a frame: what the first forces of a frame take for the step before
 
-/// Where internal damping has forces computed: f(x + tau v) = f(x) - tau K v, Kelvin-Voigt to first order; of v less
-/// its rigid part.
-Vectors positions_ahead(const BodyState& body, float delay, const RunContext& context) {
+/// m/s: velocities less the body's rigid motion.
+Vectors deforming_velocities(const BodyState& body, const RunContext& context) {
     const RigidState rigid = rigid_state(body);
     const Vec3f drifting = (rigid.linear / rigid.mass).cast<float>();
     const Vec3f turning = rigid.angular_velocity_of(rigid.angular).cast<float>(), centre = rigid.centre.cast<float>();
-    Vectors ahead = body.positions;
-    parallel_for(context, ahead.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
-        const auto move_axis = [&](float* to, const std::vector<float>& velocities, int axis) {
+    Vectors relative(body.positions.size());
+    parallel_for(context, relative.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
+        const auto along_axis = [&](float* to, const std::vector<float>& velocities, int axis) {
             const int u = (axis + 1) % 3, w = (axis + 2) % 3;
             const float *v = velocities.data(), *along_u = (body.positions.*kVectorAxes[u]).data(),
                         *along_w = (body.positions.*kVectorAxes[w]).data();
             for (std::size_t i = begin; i < end; ++i)
-                to[i] += delay * (v[i] - drifting[axis] -
-                                  (turning[u] * (along_w[i] - centre[w]) - turning[w] * (along_u[i] - centre[u])));
+                to[i] = v[i] - drifting[axis] -
+                        (turning[u] * (along_w[i] - centre[w]) - turning[w] * (along_u[i] - centre[u]));
         };
-        move_axis(ahead.x.data(), body.velocities.x, 0);
-        move_axis(ahead.y.data(), body.velocities.y, 1);
-        move_axis(ahead.z.data(), body.velocities.z, 2);
+        along_axis(relative.x.data(), body.velocities.x, 0);
+        along_axis(relative.y.data(), body.velocities.y, 1);
+        along_axis(relative.z.data(), body.velocities.z, 2);
     });
-    return ahead;
+    return relative;
 }
 
 /// Whether light corners move more than a part of a spacing in a substep beside the heaviest corners of their cells.
@@ -124,11 +123,10 @@ float change_of_acceleration(const BodyState& body, Vectors& before, const RunCo
     return std::sqrt(std::max(0.0f, all(&Sums::squares) - mean) / mass);
 }
 
-/// s, longest that is stable; 0 where no step is. A spring that is also damped along its own motion has
-/// zeta = omega tau / 2.
-double stable_step(double squared_frequency, double internal_damping) {
-    const double omega = std::sqrt(squared_frequency), zeta = 0.5 * omega * internal_damping;
-    const double step = kSafety * 2 / omega * (std::sqrt(1 + zeta * zeta) - zeta);
+/// s, longest that is stable; 0 where no step is. With a = squared_frequency, b = damping_rate: a dt^2 / 4 + b dt / 2
+/// is 1 then.
+double stable_step(double squared_frequency, double damping_rate) {
+    const double step = kSafety * 4 / (damping_rate + std::sqrt(damping_rate * damping_rate + 4 * squared_frequency));
     return std::isfinite(squared_frequency) ? step : 0;
 }
 
@@ -173,6 +171,7 @@ public:
             const double steps = steps_left();
             if (!is_finite_ || context_.is_cancelled()) break;
             const float dt = float((until_ - now_) / steps);
+            note_stability(double(dt));
             const double before = now_;
             move(dt, steps <= 1 ? until_ : now_ + double(dt));
             find_contacts();
@@ -201,6 +200,12 @@ private:
         return std::min(most, std::max(fewest, std::ceil(remaining / stable_step_)));
     }
 
+    void note_stability(double dt) {
+        if (!(dt > kBarelyLonger * stable_of_bodies_)) return;
+        ++report_.unstable_substeps;
+        report_.unstable_body = bodies_[shortest_body_].actor;
+    }
+
     /// Particles of rigid bodies as their poses have them after the last kick.
     void place_rigid() {
         for (BodyState& body : bodies_)
@@ -210,6 +215,10 @@ private:
     /// The first half of the kick, and the drift.
     void move(float dt, double until) {
         const Stopwatch watch(report_.other_seconds);
+        for (BodyState& body : bodies_) {
+            body.step_seconds = dt;
+            body.most_push = kMostPush * dt * float(pressure_wave_speed(body.body->material));
+        }
         each_elastic([&](BodyState& body, std::size_t b) {
             if (vibrations_[b].elastic.size() > 0) debts_[b].begin(body, vibrations_[b].elastic, context_);
         });
@@ -301,12 +310,18 @@ private:
             if (body.rigid) rigid_loads_[b] = rigid_load(body);
         });
         is_finite_ = true;
+        stable_of_bodies_ = kNoLimit;
         for (std::size_t b = 0; b < bodies_.size(); ++b) {
             if (bodies_[b].sleeps()) continue;
             is_finite_ &= std::isfinite(frequencies[b]);
-            stable_in_frame_ = std::min(stable_in_frame_, stable_step(frequencies[b], double(vibrations_[b].delay)));
-            if (!bodies_[b].rigid) stable_step_ = std::min(stable_step_, deforming_step(bodies_[b]));
+            double stable = stable_step(frequencies[b], double(elastic_[b].damping_rate));
+            stable_in_frame_ = std::min(stable_in_frame_, stable);
+            if (!bodies_[b].rigid) stable = std::min(stable, deforming_step(bodies_[b]));
+            if (!(stable < stable_of_bodies_)) continue;
+            stable_of_bodies_ = stable;
+            shortest_body_ = b;
         }
+        stable_step_ = std::min(stable_step_, stable_of_bodies_);
         stable_step_ = std::min(stable_step_, stable_in_frame_);
         stable_step_ = std::min(stable_step_, std::max(opening_step, kShortestOpening * stable_step_));
     }
@@ -318,23 +333,21 @@ private:
         return std::max(asked, kFlowingDelay * float(body.spacing() / pressure_wave_speed(body.material)));
     }
 
-    /// s of internal damping.
+    /// s of internal damping of the whole body.
     float find_delay(std::size_t b, float dt) {
         const BodyState& body = bodies_[b];
         Vibration& vibration = vibrations_[b];
         const float usual = usual_delay(*body.body);
         if (!std::exchange(vibration.has_forces, true)) return usual;
-        const float crushed =
-            kCrushedDelay * dt * std::clamp(1 - elastic_[b].least_volume_ratio / kCrushedFrom, 0.0f, 1.0f);
         if (vibration.before.size() == 0) {
             vibration.before = body.forces;
-            return std::max(usual, crushed);
+            return usual;
         }
         const float change = dt * change_of_acceleration(body, vibration.before, context_) /
                              float(pressure_wave_speed(body.body->material));
         const float noisy = kNoisyDelay * dt * std::clamp((change - kCalm) / (kNoisy - kCalm), 0.0f, 1.0f);
         const float rubbing = vibration.is_calmed ? kRubbingDelay * dt : 0;
-        return std::max({usual, crushed, noisy, rubbing});
+        return std::max({usual, noisy, rubbing});
     }
 
     /// is_again: nothing has moved since the last time.
@@ -353,18 +366,24 @@ private:
 
     void find_elastic_forces_of(std::size_t b, float dt, bool is_again) {
         BodyState& body = bodies_[b];
-        float& delay = vibrations_[b].delay;
-        if (!body.rigid && !(is_again && vibrations_[b].has_forces)) delay = find_delay(b, dt);
-        const bool swings = light_corners_swing(body, dt);
-        if (delay > 0 || swings) {
-            Vectors ahead = delay > 0 ? positions_ahead(body, delay, context_) : body.positions;
-            if (swings) damp_light_corners(body, dt, ahead);
-            elastic_[b] = body.elasticity->forces(ahead, body.forces, context_);
-        } else {
+        if (body.rigid) {
             elastic_[b] = body.elasticity->forces(body.positions, body.forces, context_);
+            return;
+        }
+        float& delay = vibrations_[b].delay;
+        if (!(is_again && vibrations_[b].has_forces)) delay = find_delay(b, dt);
+        Vectors ahead; // of light corners
+        if (light_corners_swing(body, dt)) damp_light_corners(body, dt, ahead = body.positions);
+        const Vectors& positions = ahead.size() > 0 ? ahead : body.positions;
+        if (delay > 0 || elastic_[b].least_volume_ratio < InternalDamping::kDampedBelow) {
+            const InternalDamping damping{deforming_velocities(body, context_), delay, kCrushedDelay * dt,
+                                          float(kStifferDamped) * body.rest_squared_frequency, elastic_[b]};
+            elastic_[b] = body.elasticity->damped_forces(positions, damping, body.forces, context_);
+        } else {
+            elastic_[b] = body.elasticity->forces(positions, body.forces, context_);
         }
         if (debts_[b].has_begun()) debts_[b].moved(body, body.forces);
-        const bool is_crushed = elastic_[b].least_volume_ratio < kCrushedFrom;
+        const bool is_crushed = elastic_[b].least_volume_ratio < InternalDamping::kDampedBelow;
         vibrations_[b].elastic = is_crushed ? body.forces : Vectors();
     }
 
@@ -477,6 +496,8 @@ private:
     std::vector<RigidLoad> rigid_loads_; ///< of each body, by find_forces
     RigidContacts rigid_contacts_;       ///< the same
     double stable_step_ = 0;             // s
+    double stable_of_bodies_ = kNoLimit; ///< s, by what the bodies are themselves ...
+    std::size_t shortest_body_ = 0;      ///< ... and the one that asks for it
     bool is_finite_ = true;              ///< the forces found last
     /// s: the shortest step that any body's vibrations have asked for in this frame. Steps that become longer again as
     /// these swing give them energy.
