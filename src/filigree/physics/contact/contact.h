@@ -54,6 +54,8 @@ public:
     }
     /// Whether points are followed, as of all obstacles but half-spaces.
     bool follows_points() const { return std::ranges::any_of(shapes_, &ObstacleShape::is_traced); }
+    /// Whether a body is near an obstacle whose surface is followed, and whose edges push.
+    bool is_near_traced(std::size_t body) const { return !near_[body].traces.empty() || features_.is_near(body); }
     /// s: in longer steps something could pass through something.
     double longest_step() const { return matter_.longest_step(); }
     /// The next search finds everything again, and ways are counted from here; anchors and touches stay.

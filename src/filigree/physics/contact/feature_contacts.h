@@ -32,6 +32,9 @@ public:
         float clear_until; ///< way until which it cannot touch
     };
     const std::vector<Near>& near() const { return near_; }
+    bool is_near(std::size_t body) const {
+        return std::ranges::binary_search(near_, Index(body), {}, &Near::body);
+    }
     void set_near(std::vector<Near> near) { near_ = std::move(near); }
     bool is_sound(std::span<const Near> near, std::span<const BodyState> bodies, std::span<const ObstacleShape> shapes,
                   const MatterContacts& matter) const;

@@ -278,7 +278,7 @@ void MatterContacts::find_sides(std::span<const BodyState> bodies, double frame,
         if (!between_bodies_) continue;
         sweep.each_near(a, reach + spacing, room, [&](std::size_t b) {
             const Index other = meeting[sweep.order()[b]];
-            if (other == body) return;
+            if (other == body || (bodies[body].rigid && bodies[other].rigid)) return; // those are RigidPairs'
             if (matter_[other]) add(body, other);
             if (matter_[body]) add(other, body);
         });

@@ -17,17 +17,17 @@ struct ContactPoint {
     Vec3f other_velocity = Vec3f::Zero(); ///< m/s, of an obstacle there
     float friction = 0, restitution = 0;
     Vec3f* force = nullptr; ///< N, on the body: of the last substep, where the solver starts; then of this one
-    bool* holds = nullptr;  ///< whether it pushes
+    bool* holds = nullptr;  ///< whether it pushes; null: nobody asks
 };
 
 /// m outside of something at which a point of a rigid body counts as touching it: in a substep it may get there. speed:
 /// m/s, of anything of the two beside each other. spacing: m, the smaller.
 float touching_margin(float spacing, float speed);
 
-/// Sequential impulses [Catto 2006] in short substeps, started from the forces of the substep before. Sweeps go on
-/// until velocities hardly change, so that heavy bodies on light ones stand; their number is bounded by the work that
-/// they are. Penetration is corrected by velocities that are taken away again after the bodies have moved, and
-/// restitution is applied then. Same bytes for any number of threads: one thread solves.
+/// Sequential impulses [Catto 2006] in short substeps, started from the forces of the substep before. Bodies that touch
+/// are an island, and each island is swept until its velocities hardly change, so that heavy bodies on light ones
+/// stand; the number of sweeps is bounded by the work that they are. Penetration is corrected by velocities that are
+/// taken away again after the bodies have moved, and restitution is applied then. Same bytes for any number of threads.
 class RigidContacts {
 public:
     void clear() { points_.clear(); }
@@ -35,41 +35,50 @@ public:
 
     std::span<const ContactPoint> points() const { return points_; }
 
-    /// Before loads change velocities: what restitution goes by.
-    void prepare(std::span<const BodyState> bodies);
+    /// Before loads change velocities: what restitution goes by. Of the points that a body has on obstacles a manifold
+    /// is left. gravity: m/s^2, what comes becomes faster until it touches.
+    void prepare(std::span<const BodyState> bodies, const Vec3d& gravity);
     /// After loads have changed velocities: the velocities with which bodies move for dt.
-    void solve(std::span<BodyState> bodies, double dt);
+    void solve(std::span<BodyState> bodies, double dt, const RunContext& context);
     /// After bodies have moved for dt: the velocities with which they go on. slow: m/s, of approach, below which
     /// nothing bounces.
-    void finish(std::span<BodyState> bodies, double dt, double slow);
+    void finish(std::span<BodyState> bodies, double dt, double slow, const RunContext& context);
     /// Whether something pushes a body; after solve.
     bool pushes(std::size_t body) const { return is_pushed_[body] != 0; }
 
 private:
-    struct Mover { ///< a body as the solver sees it
-        Vec3d velocity, spin;
-        Mat3d inverse_inertia;
-        double inverse_mass;
+    struct Mover { ///< a body as the solver sees it; the first is what nothing moves
+        Vec3d velocity = Vec3d::Zero(), spin = Vec3d::Zero();
+        Mat3d inverse_inertia = Mat3d::Zero();
+        double inverse_mass = 0;
     };
-    struct Row {           ///< a contact point
-        Index body, other; ///< movers; other: kNoIndex is what nothing moves
-        Vec3d normal, arm, other_arm, tangents[2];
-        Vec3d other_velocity;
-        double mass, tangent_masses[2];                   ///< kg, that an impulse there moves
+    struct Row {                  ///< a contact point
+        Index body, other, point; ///< movers; of points_
+        Vec3d normal, tangents[2], arm, other_arm;
+        double mass, tangent_masses[2]; ///< kg, that an impulse there moves
+        double beside[2];               ///< m/s along the tangents of an impulse of 1 along the normal
+        double other_velocity[3];       ///< m/s, of an obstacle: along the normal and the tangents
         double impulse = 0, tangent_impulses[2] = {0, 0}; ///< N s, in all
         double target = 0;                                ///< m/s, along the normal: at least
-        double approach; ///< m/s along the normal before the substep; below 0 they come nearer
-        double separation;
+        double approach; ///< m/s along the normal before the substep, or when they touch; below 0 they come nearer
+        double separation, friction;
+        Vec3d whole_impulse() const {
+            return impulse * normal + tangent_impulses[0] * tangents[0] + tangent_impulses[1] * tangents[1];
+        }
     };
+    void reduce_on_obstacles(std::span<const BodyState> bodies);
     Index mover_of(std::span<const BodyState> bodies, Index body);
+    void find_islands();
+    void begin_row(Row& row, const ContactPoint& point, std::span<const BodyState> bodies, const Vec3d& gravity) const;
     Vec3d relative_velocity(const Row& row) const;
     void push(const Row& row, const Vec3d& impulse);
-    double solve_row(Row& row, double friction);
-    void sweep_until_still(double tolerance);
+    double solve_row(Row& row);
+    void sweep_until_still(std::span<const Index> rows, std::size_t most_rows, double tolerance);
     void write_back(std::span<BodyState> bodies) const;
 
     std::vector<ContactPoint> points_;
-    std::vector<Row> rows_; ///< of the points
+    std::vector<Row> rows_;              ///< of points, island by island
+    std::vector<Index> islands_, swept_; ///< first row of each, and how many there are; numbers of rows
     std::vector<Mover> movers_;
     std::vector<Index> body_of_mover_, mover_of_body_;
     std::vector<std::uint8_t> is_pushed_; ///< of each body

@@ -19,6 +19,9 @@ public:
             beside_soft_[a] |= !is_rigid(b);
             beside_soft_[b] |= !is_rigid(a);
         });
+        state.rigid_pairs.each_holding([&](Index a, Index b) {
+            if (!state.bodies[a].is_absent && !state.bodies[b].is_absent) groups_.join(a, b);
+        });
         for (Index b = 0; b < on_obstacle_.size(); ++b)
             if (is_rigid(b) && state.contacts.is_on_obstacle(b)) on_obstacle_[groups_.root(b)] = 1;
     }

@@ -40,6 +40,7 @@ constexpr double kMostDeforming = 0.5;    ///< spacings a substep, between parti
 constexpr unsigned kMostSubsteps = 20000; ///< a frame
 constexpr double kUsualSubsteps = 256;    ///< a frame: what the first forces of a frame take for the step before
 constexpr float kFaster = 1.5f;           ///< than now, anything may go in the next substep
+constexpr double kSlowHit = 0.02, kSlowHitSubsteps = 2; ///< m/s, and of gravity: what comes slower does not bounce
 
 /// Where internal damping has forces computed: f(x + tau v) = f(x) - tau K v, Kelvin-Voigt to first order; of v less
 /// its rigid part.
@@ -151,7 +152,8 @@ public:
     ExplicitSteps(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context)
         : state_(state), bodies_(state.bodies), report_(report), context_(context), now_(from), until_(until),
           meets_anything_(!state.world.obstacles.empty() || state.options.contacts_within_bodies ||
-                          (state.options.contacts_between_bodies && state.bodies.size() > 1)) {}
+                          (state.options.contacts_between_bodies && state.bodies.size() > 1)),
+          has_soft_(std::ranges::any_of(state.bodies, [](const BodyState& b) { return !b.is_absent && !b.rigid; })) {}
 
     double run() {
         if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
@@ -220,17 +222,17 @@ private:
     void move_rigid(double dt) {
         wake_met(dt);
         const Vec3d& gravity = state_.world.gravity;
-        rigid_contacts_.prepare(bodies_);
+        rigid_contacts_.prepare(bodies_, gravity);
         each_awake_rigid([&](BodyState& body, std::size_t b) {
             kick_rigid(body, {}, gravity, dt, 1);
             kick_rigid(body, rigid_loads_[b], Vec3d::Zero(), 0.5 * dt, std::exp(-dt * body.body->material.damping));
         });
-        rigid_contacts_.solve(bodies_, dt);
+        rigid_contacts_.solve(bodies_, dt, context_);
         each_awake_rigid([&](BodyState& body, std::size_t b) {
             drift_rigid(body, dt);
             if (!rigid_contacts_.pushes(b)) body.rigid->centre -= 0.5 * dt * dt * gravity;
         });
-        rigid_contacts_.finish(bodies_, dt, double(contact_law::smooth_speed(state_.world, float(dt))));
+        rigid_contacts_.finish(bodies_, dt, kSlowHit + kSlowHitSubsteps * dt * gravity.norm(), context_);
         place_rigid();
     }
 
@@ -258,7 +260,8 @@ private:
         const float way = speed * float(frame) + float(obstacle_way(state_.world, bodies_, now_, now_ + frame));
         const float spacing = least_spacing(bodies_);
         float step_way = 0;
-        if (state_.contacts.follows_points()) { // half-spaces stop also what is found below them
+        const bool any_rigid = std::ranges::any_of(bodies_, [](const BodyState& b) { return b.rigid.has_value(); });
+        if (state_.contacts.follows_points() || any_rigid) { // half-spaces stop also what is found below them
             const double step = std::min(frame / kLeastSubsteps, stable_step_ > 0 ? stable_step_ : frame);
             step_way = kFaster * (speed * float(step) + float(obstacle_way(state_.world, bodies_, now_, now_ + step)));
         }
@@ -270,15 +273,26 @@ private:
                                context_);
     }
 
+    /// Whether penalties may push a rigid body, which its squared frequency stands for.
+    bool is_pushed_by_penalty(std::size_t b) const { return has_soft_ || state_.contacts.is_near_traced(b); }
+
     /// All forces at the present positions, and the step that is stable there.
     void find_forces(float dt, bool is_again = false) {
         find_elastic_forces(dt, is_again);
+        if (meets_anything_) {
+            const Stopwatch watch(report_.contact_seconds);
+            const double longest = std::min(state_.frame_seconds() / kLeastSubsteps, double(kLongestRigidStep));
+            if (state_.rigid_pairs.search(bodies_, longest, context_)) state_.contacts.woke(bodies_);
+        }
         {
             const Stopwatch watch(report_.contact_seconds);
             const ContactReport touching = state_.contacts.add_forces(bodies_, now_, dt, rigid_contacts_, context_);
             report_.contacts = touching.contacts;
             report_.deepest_contact = std::max(report_.deepest_contact, double(touching.deepest));
-            report_.deepest_in_matter = std::max(report_.deepest_in_matter, double(touching.deepest_in_matter));
+            const RigidPairs::Report rigid = state_.rigid_pairs.add_points(bodies_, rigid_contacts_, context_);
+            report_.contacts += rigid.contacts;
+            report_.deepest_in_matter =
+                std::max({report_.deepest_in_matter, double(touching.deepest_in_matter), double(rigid.deepest)});
         }
         const Stopwatch watch(report_.other_seconds);
         state_.external.add_forces(bodies_, now_, context_);
@@ -288,7 +302,7 @@ private:
             BodyState& body = bodies_[b];
             if (body.sleeps()) continue;
             double& squared_frequency = frequencies[b];
-            squared_frequency = double(elastic_[b].squared_frequency);
+            squared_frequency = body.rigid && !is_pushed_by_penalty(b) ? 0 : double(elastic_[b].squared_frequency);
             if (!body.rigid)
                 squared_frequency += state_.contacts.added_frequency(b) * double(body.rest_squared_frequency);
             squared_frequency = state_.external.add_pulls(body, b, now_, squared_frequency);
@@ -311,6 +325,8 @@ private:
             stable_in_frame_ = std::min(stable_in_frame_, stable_step(frequencies[b], double(vibrations_[b].delay)));
             if (!bodies_[b].rigid) stable_step_ = std::min(stable_step_, deforming_step(bodies_[b]));
         }
+        if (std::ranges::any_of(bodies_, [](const BodyState& body) { return body.rigid && !body.sleeps(); }))
+            stable_step_ = std::min({stable_step_, state_.rigid_pairs.longest_step(), double(kLongestRigidStep)});
         stable_step_ = std::min(stable_step_, stable_in_frame_);
         stable_step_ = std::min(stable_step_, std::max(opening_step, kShortestOpening * stable_step_));
     }
@@ -376,6 +392,7 @@ private:
         const Stopwatch watch(report_.other_seconds);
         kick(0.5f * dt, true);
         each_awake_rigid([&](BodyState& body, std::size_t b) {
+            if (rigid_loads_[b].force.isZero(0) && rigid_loads_[b].torque.isZero(0)) return;
             kick_rigid(body, rigid_loads_[b], Vec3d::Zero(), 0.5 * double(dt), 1);
             place_particles(body);
         });
@@ -436,6 +453,7 @@ private:
     const RunContext& context_;
     double now_, until_;        // s
     const bool meets_anything_; // obstacles, other bodies or parts of the same
+    const bool has_soft_;       ///< bodies that are not rigid
     std::vector<ElasticReport> elastic_;
     struct Vibration {           ///< of a body
         bool has_forces = false; ///< of this frame; those before it are not known after a restore

@@ -5,6 +5,7 @@
 #include "filigree/physics/breaking/piece_followers.h"
 #include "filigree/physics/contact/contact.h"
 #include "filigree/physics/grid/mpm.h"
+#include "filigree/physics/rigid/rigid_pairs.h"
 #include "filigree/physics/simulation.h"
 #include "filigree/physics/step/external_forces.h"
 #include "filigree/physics/step/made_for.h"
@@ -19,7 +20,7 @@ struct SimulationState {
         : world(std::move(the_world)), options(the_options), actor_count(the_actor_count), made_for(what_for),
           contacts(world, body_count, the_actor_count, the_options.contacts_between_bodies,
                    the_options.contacts_within_bodies),
-          external(world, body_count) {}
+          rigid_pairs(world, the_actor_count, the_options.contacts_between_bodies), external(world, body_count) {}
     SimulationState(const SimulationState&) = delete; // contacts and external refer to the world
     SimulationState& operator=(const SimulationState&) = delete;
 
@@ -33,6 +34,7 @@ struct SimulationState {
     std::vector<StartOverlap> start_overlaps;
     std::vector<Cracks> cracks; ///< of bodies that break
     Contacts contacts;
+    RigidPairs rigid_pairs;
     ExternalForces external;
     std::unique_ptr<mpm::Bodies> grid; ///< of bodies of mpm; never null
     std::vector<Attachment> attachments;
