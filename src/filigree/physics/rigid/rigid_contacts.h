@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/physics/body/body_state.h"
+#include "filigree/physics/rigid/contact_rows.h"
 
 #include <span>
 #include <vector>
@@ -37,7 +38,7 @@ public:
 
     /// Before loads change velocities: what restitution goes by. Of the points that a body has on obstacles a manifold
     /// is left. gravity: m/s^2, what comes becomes faster until it touches.
-    void prepare(std::span<const BodyState> bodies, const Vec3d& gravity);
+    void prepare(std::span<const BodyState> bodies, const Vec3d& gravity, const RunContext& context);
     /// After loads have changed velocities: the velocities with which bodies move for dt.
     void solve(std::span<BodyState> bodies, double dt, const RunContext& context);
     /// After bodies have moved for dt: the velocities with which they go on. slow: m/s, of approach, below which
@@ -47,40 +48,34 @@ public:
     bool pushes(std::size_t body) const { return is_pushed_[body] != 0; }
 
 private:
-    struct Mover { ///< a body as the solver sees it; the first is what nothing moves
-        Vec3d velocity = Vec3d::Zero(), spin = Vec3d::Zero();
-        Mat3d inverse_inertia = Mat3d::Zero();
-        double inverse_mass = 0;
-    };
-    struct Row {                  ///< a contact point
-        Index body, other, point; ///< movers; of points_
-        Vec3d normal, tangents[2], arm, other_arm;
-        double mass, tangent_masses[2]; ///< kg, that an impulse there moves
-        double beside[2];               ///< m/s along the tangents of an impulse of 1 along the normal
-        double other_velocity[3];       ///< m/s, of an obstacle: along the normal and the tangents
-        double impulse = 0, tangent_impulses[2] = {0, 0}; ///< N s, in all
-        double target = 0;                                ///< m/s, along the normal: at least
-        double approach; ///< m/s along the normal before the substep, or when they touch; below 0 they come nearer
-        double separation, friction;
-        Vec3d whole_impulse() const {
-            return impulse * normal + tangent_impulses[0] * tangents[0] + tangent_impulses[1] * tangents[1];
-        }
+    struct Mover { ///< a body as it was before; the first is what nothing moves
+        Index body = kNoIndex;
+        Vec3d velocity = Vec3d::Zero(), spin = Vec3d::Zero(), angular = Vec3d::Zero();
+        Mat3d turn = Mat3d::Identity();
+        Mat3f inverse_inertia = Mat3f::Zero();
+        float inverse_mass = 0;
     };
     void reduce_on_obstacles(std::span<const BodyState> bodies);
     Index mover_of(std::span<const BodyState> bodies, Index body);
     void find_islands();
-    void begin_row(Row& row, const ContactPoint& point, std::span<const BodyState> bodies, const Vec3d& gravity) const;
-    Vec3d relative_velocity(const Row& row) const;
-    void push(const Row& row, const Vec3d& impulse);
-    double solve_row(Row& row);
-    void sweep_until_still(std::span<const Index> rows, std::size_t most_rows, double tolerance);
+    void begin_answer(ContactRow::Answer& answer, const ContactRow& row, Index mover, const Vec3d& arm) const;
+    void begin_row(ContactRow& row, std::span<const BodyState> bodies, const Vec3d& gravity) const;
+    Vec3d velocity_before(const ContactRow& row, const Vec3d& arm, const Vec3d& other_arm) const;
+    void take_velocities(std::span<const BodyState> bodies);
+    void start_row(ContactRow& row, std::span<const BodyState> bodies, double dt);
+    void sweep_until_still(std::span<const Index> rows, std::size_t most_rows, float tolerance);
     void write_back(std::span<BodyState> bodies) const;
 
     std::vector<ContactPoint> points_;
-    std::vector<Row> rows_;              ///< of points, island by island
-    std::vector<Index> islands_, swept_; ///< first row of each, and how many there are; numbers of rows
+    std::vector<ContactRow> rows_; ///< of points, island by island
+    struct Touching {
+        Index body, other, point; ///< movers
+    };
+    std::vector<Touching> touching_, sorted_; ///< of rows, in the order of points and in their own
+    std::vector<Index> islands_, swept_;      ///< first row of each, and how many there are; numbers of rows
     std::vector<Mover> movers_;
-    std::vector<Index> body_of_mover_, mover_of_body_;
+    std::vector<MoverChange> changes_; ///< of movers
+    std::vector<Index> mover_of_body_;
     std::vector<std::uint8_t> is_pushed_; ///< of each body
 };
 

@@ -14,9 +14,10 @@ constexpr std::size_t kPlacedGrain = 32, kPairsGrain = 16;
 constexpr float kAlmostTouching = 0.02f; ///< spacings outside at which points take part at rest
 constexpr float kFarthestWay = 1;        ///< spacings that two bodies near each other may go in a substep
 constexpr float kMostGained = 0.25f;     ///< spacings that points are looked for further away beside a blow
-constexpr float kLookedFurther = 0.04f;  ///< spacings that points are found further outside, so that they serve longer
-constexpr float kMayGain = 1.2f;         ///< what comes may become so much faster within a substep
-constexpr float kAcross = 0.05f;         ///< spacings: nearer points take part whether they come nearer or not
+/// Spacings that points are looked for further outside, so that they serve for more than one substep.
+constexpr float kLeastFurther = 0.04f, kMostFurther = 0.2f;
+constexpr float kMayGain = 1.2f; ///< what comes may become so much faster within a substep
+constexpr float kAcross = 0.05f; ///< spacings: nearer points take part whether they come nearer or not
 
 bool is_of_other(Index number) { return (number & 1) != 0; }
 
@@ -40,6 +41,8 @@ public:
         return numbers;
     }
     Vec3f operator()(const Vec3f& point) const { return turn_ * point + shift_; }
+    const Mat3f& turn() const { return turn_; }
+    const Vec3f& shift() const { return shift_; }
     /// How much it turns more or less than another.
     float turned(const AxesMap& other) const { return (turn_ - other.turn_).norm(); }
 
@@ -241,7 +244,9 @@ void RigidPairs::find_points(Pair& pair, std::span<const BodyState> bodies, Cand
     found.is_passing = false;
     const AxesMap map = to_axes(pair.body, pair.other), back = to_axes(pair.other, pair.body);
     if (!(pair.margin + moved(pair, map) <= pair.looked)) {
-        pair.looked = pair.margin + kLookedFurther * spacing_of(bodies, pair);
+        const float spacing = spacing_of(bodies, pair);
+        pair.looked =
+            pair.margin + std::clamp(float(step_) * pair.speed, kLeastFurther * spacing, kMostFurther * spacing);
         pair.beside = map.numbers();
         add_near_points(pair, false, map, bodies, found);
         add_near_points(pair, true, back, bodies, found);

@@ -1,57 +1,59 @@
 #include "filigree/physics/rigid/rigid_shape.h"
 
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace filigree {
 
 namespace {
 
-constexpr Index kLeafPoints = 8;
+constexpr float kNowhere = std::numeric_limits<float>::quiet_NaN(); ///< in no box
 constexpr float kTurnedFromEntry = -0.2f; ///< cosine between the entry and a normal that is not its side's
 constexpr int kEntrySteps = 12, kTouchSteps = 12;
 constexpr float kTouched = 0.02f; ///< spacings
 
 } // namespace
 
-RigidShape::RigidShape(const Body& body) : body_(body), points_(body.surface.points.rest), numbers_(points_.size()) {
-    std::iota(numbers_.begin(), numbers_.end(), Index{0});
+RigidShape::RigidShape(const Body& body) : body_(body) {
+    const std::vector<Vec3f>& points = body.surface.points.rest;
     Box box;
     for (const auto& corner : body.cells.corners)
         box.extend(body.cells.origin + body.cells.spacing * Vec3d(corner[0], corner[1], corner[2]));
-    for (const Vec3f& point : points_) box.extend(point.cast<double>());
+    for (const Vec3f& point : points) box.extend(point.cast<double>());
     if (box.empty()) return;
     centre_ = box.centre().cast<float>();
     half_ = (0.5 * box.size()).cast<float>().array() + body.field_radius;
-    if (!points_.empty()) add_node(0, Index(points_.size()));
+    std::vector<Index> numbers(points.size());
+    std::iota(numbers.begin(), numbers.end(), Index{0});
+    if (!numbers.empty()) add_node(numbers);
 }
 
 /// Halves sets of points along their longest side.
-void RigidShape::add_node(Index first, Index last) {
+void RigidShape::add_node(std::span<Index> numbers) {
+    const std::vector<Vec3f>& points = body_.surface.points.rest;
     Box box;
-    for (Index k = first; k < last; ++k) box.extend(points_[k].cast<double>());
+    for (const Index k : numbers) box.extend(points[k].cast<double>());
     const std::size_t number = nodes_.size();
-    nodes_.push_back({box.centre().cast<float>(), 0, first, last, 0});
+    const Vec3f centre = box.centre().cast<float>();
     float radius = 0;
-    for (Index k = first; k < last; ++k) radius = std::max(radius, (points_[k] - nodes_[number].centre).norm());
-    nodes_[number].radius = radius;
-    if (last - first > kLeafPoints) {
+    for (const Index k : numbers) radius = std::max(radius, (points[k] - centre).norm());
+    nodes_.push_back({centre, radius, Index(blocks_.size()), 0});
+    if (numbers.size() > kBlock) {
         int axis = 0;
         box.size().maxCoeff(&axis);
-        std::vector<Index> order(last - first);
-        std::iota(order.begin(), order.end(), first);
-        std::ranges::stable_sort(order, {}, [&](Index k) { return points_[k][axis]; });
-        std::vector<Vec3f> points;
-        std::vector<Index> numbers;
-        for (const Index k : order) {
-            points.push_back(points_[k]);
-            numbers.push_back(numbers_[k]);
+        std::ranges::stable_sort(numbers, {}, [&](Index k) { return points[k][axis]; });
+        add_node(numbers.first(numbers.size() / 2));
+        add_node(numbers.subspan(numbers.size() / 2));
+    } else {
+        Block& block = blocks_.emplace_back();
+        for (std::size_t k = 0; k < kBlock; ++k) {
+            const Vec3f point = k < numbers.size() ? points[numbers[k]] : Vec3f::Constant(kNowhere);
+            block.x[k] = point.x();
+            block.y[k] = point.y();
+            block.z[k] = point.z();
+            block.numbers[k] = k < numbers.size() ? numbers[k] : kNoIndex;
         }
-        std::ranges::copy(points, points_.begin() + first);
-        std::ranges::copy(numbers, numbers_.begin() + first);
-        const Index middle = first + (last - first) / 2;
-        add_node(first, middle);
-        add_node(middle, last);
     }
     nodes_[number].next = Index(nodes_.size());
 }

@@ -1,6 +1,7 @@
 // What a rigid body touches others with: its surface points in a tree, and its distance field. Private to the layer.
 #pragma once
 
+#include "filigree/core/bits.h"
 #include "filigree/physics/body.h"
 
 #include <algorithm>
@@ -48,28 +49,46 @@ public:
                 continue;
             }
             if (node.next != ++n) continue;
-            for (Index k = node.first; k < node.last; ++k) {
-                const Vec3f at = to_other(points_[k]);
-                if (!other.is_outside_box(at, reach) && other.distance(at) < reach) visit(numbers_[k], points_[k], at);
-            }
+            const Block& block = blocks_[node.block];
+            const std::uint64_t inside = block.in_box(to_other, other.centre_, other.half_.array() + reach);
+            for_each_bit(inside, [&](int k) {
+                const Vec3f at = to_other(block.point(k));
+                if (other.distance(at) < reach) visit(block.numbers[k], block.point(k), at);
+            });
         }
     }
 
 private:
     static constexpr float kSteepest = 1.1f; ///< a field's distances on a grid grow hardly faster than this
-    struct Node {                            ///< after it come those below it
+    static constexpr std::size_t kBlock = 16;
+    struct Block { ///< points of a leaf, then points that are nowhere
+        float x[kBlock], y[kBlock], z[kBlock];
+        Index numbers[kBlock]; ///< among the body's surface points
+        Vec3f point(int k) const { return {x[k], y[k], z[k]}; }
+        template <class Map>
+        std::uint64_t in_box(const Map& map, const Vec3f& centre, const Vec3f& half) const {
+            const Mat3f& m = map.turn();
+            const Vec3f from = map.shift() - centre;
+            return bits_where<kBlock>([&](std::size_t k) __attribute__((always_inline)) {
+                const float u = m(0, 0) * x[k] + m(0, 1) * y[k] + m(0, 2) * z[k] + from.x();
+                const float v = m(1, 0) * x[k] + m(1, 1) * y[k] + m(1, 2) * z[k] + from.y();
+                const float w = m(2, 0) * x[k] + m(2, 1) * y[k] + m(2, 2) * z[k] + from.z();
+                return bool((std::abs(u) <= half.x()) & (std::abs(v) <= half.y()) & (std::abs(w) <= half.z()));
+            });
+        }
+    };
+    struct Node { ///< after it come those below it
         Vec3f centre;
         float radius;
-        Index first, last; ///< of the points
-        Index next;        ///< the node after all that are below this one
+        Index block; ///< of a leaf
+        Index next;  ///< the node after all that are below this one
     };
-    void add_node(Index first, Index last);
+    void add_node(std::span<Index> numbers);
 
     const Body& body_;
     Vec3f centre_ = Vec3f::Zero(), half_ = Vec3f::Zero();
-    std::vector<Vec3f> points_;
-    std::vector<Index> numbers_; ///< of the points, among the body's surface points
     std::vector<Node> nodes_;
+    std::vector<Block> blocks_;
 };
 
 } // namespace filigree

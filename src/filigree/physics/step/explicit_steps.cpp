@@ -153,7 +153,8 @@ public:
         : state_(state), bodies_(state.bodies), report_(report), context_(context), now_(from), until_(until),
           meets_anything_(!state.world.obstacles.empty() || state.options.contacts_within_bodies ||
                           (state.options.contacts_between_bodies && state.bodies.size() > 1)),
-          has_soft_(std::ranges::any_of(state.bodies, [](const BodyState& b) { return !b.is_absent && !b.rigid; })) {}
+          has_soft_(std::ranges::any_of(state.bodies, [](const BodyState& b) { return !b.is_absent && !b.rigid; })),
+          rigid_contacts_(state.rigid_contacts) {}
 
     double run() {
         if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
@@ -222,7 +223,7 @@ private:
     void move_rigid(double dt) {
         wake_met(dt);
         const Vec3d& gravity = state_.world.gravity;
-        rigid_contacts_.prepare(bodies_, gravity);
+        rigid_contacts_.prepare(bodies_, gravity, context_);
         each_awake_rigid([&](BodyState& body, std::size_t b) {
             kick_rigid(body, {}, gravity, dt, 1);
             kick_rigid(body, rigid_loads_[b], Vec3d::Zero(), 0.5 * dt, std::exp(-dt * body.body->material.damping));
@@ -462,7 +463,7 @@ private:
     };
     std::vector<Vibration> vibrations_;
     std::vector<RigidLoad> rigid_loads_; ///< of each body, by find_forces
-    RigidContacts rigid_contacts_;       ///< the same
+    RigidContacts& rigid_contacts_;      ///< the same
     double stable_step_ = 0;             // s
     bool is_finite_ = true;              ///< the forces found last
     /// s: the shortest step that any body's vibrations have asked for in this frame. Steps that become longer again as

@@ -35,6 +35,7 @@ struct SimulationState {
     std::vector<Cracks> cracks; ///< of bodies that break
     Contacts contacts;
     RigidPairs rigid_pairs;
+    RigidContacts rigid_contacts; ///< room that is used again; nothing is remembered
     ExternalForces external;
     std::unique_ptr<mpm::Bodies> grid; ///< of bodies of mpm; never null
     std::vector<Attachment> attachments;
