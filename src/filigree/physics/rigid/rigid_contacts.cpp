@@ -4,7 +4,6 @@
 
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
-#include "filigree/physics/rigid/contact_manifold.h"
 #include "filigree/physics/rigid/rigid_body.h"
 
 #include <algorithm>
@@ -22,8 +21,8 @@ constexpr double kDeep = 0.5;            ///< spacings; deeper there is no such 
 constexpr double kSlop = 2e-3;           ///< spacings of penetration that are left, so that what rests keeps touching
 constexpr std::size_t kFewestSweeps = 3, kMostSweeps = 400, kMostRowsSwept = 8000;
 constexpr std::size_t kIslandsGrain = 8, kRowsGrain = 128;
-constexpr float kAbout = 0.02f; ///< spacings: ManifoldPoint's margin on obstacles
-constexpr double kStill = 1e-4; ///< of what gravity adds in a substep: a smaller change of velocity ends the sweeps
+constexpr float kTouches = 0.005f; ///< spacings outside: what has come so near bounces as what pushes does
+constexpr double kStill = 1e-4;    ///< of what gravity adds in a substep: a smaller change of velocity ends the sweeps
 
 /// m/s that take a part of a penetration away in dt. What came deep into an obstacle, faster than a substep can see, is
 /// out soon.
@@ -45,25 +44,39 @@ float touching_margin(float spacing, float speed) {
     return kLeast * spacing + kFaster * kLongestRigidStep * speed;
 }
 
+/// What has to be said of points of one body on obstacles for a manifold.
+std::vector<ManifoldPoint> RigidContacts::manifold_points(std::span<const ContactPoint> points, const RigidPose& pose) {
+    const Mat3d turn = pose.turn.toRotationMatrix();
+    const Vec3d spin = turn * (pose.inverse_inertia * (turn.transpose() * pose.angular));
+    std::vector<ManifoldPoint> manifold;
+    for (const ContactPoint& point : points) {
+        const Vec3d velocity = pose.velocity + spin.cross(point.place.cast<double>() - pose.centre);
+        const float comes = (point.other_velocity - velocity.cast<float>()).dot(point.normal);
+        manifold.push_back(
+            {point.place, point.normal, point.separation - kLongestRigidStep * std::max(0.0f, comes), *point.force});
+    }
+    return manifold;
+}
+
 /// Points on obstacles come body by body.
 void RigidContacts::reduce_on_obstacles(std::span<const BodyState> bodies) {
-    std::vector<ManifoldPoint> group;
     std::size_t kept = 0;
     for (std::size_t from = 0, to = 0; from < points_.size(); from = to) {
         const Index body = points_[from].body;
         const auto belongs = [&](const ContactPoint& point) { return point.body == body && point.other == kNoIndex; };
         for (to = from + 1; to < points_.size() && belongs(points_[from]) && belongs(points_[to]);) ++to;
-        group.clear();
-        for (std::size_t k = from; k < to; ++k)
-            group.push_back({points_[k].place, points_[k].normal, points_[k].separation, *points_[k].force});
-        reduce_manifold(group, kAbout * float(bodies[body].body->spacing()));
-        for (std::size_t k = from; k < to; ++k) {
-            const ManifoldPoint& point = group[k - from];
-            *points_[k].force = point.force;
-            if (point.is_kept)
-                points_[kept++] = points_[k];
-            else if (points_[k].holds)
-                *points_[k].holds = false;
+        if (to - from <= kMostInManifold) {
+            while (from < to) points_[kept++] = points_[from++];
+            continue;
+        }
+        std::vector<ManifoldPoint> manifold =
+            manifold_points(std::span(points_).subspan(from, to - from), *bodies[body].rigid);
+        reduce_manifold(manifold, kManifoldScale * float(bodies[body].body->spacing()));
+        for (const ManifoldPoint& point : manifold) {
+            const ContactPoint& of = points_[from++];
+            *of.force = point.force;
+            if (!point.is_kept && of.holds) *of.holds = false;
+            if (point.is_kept) points_[kept++] = of;
         }
     }
     points_.resize(kept);
@@ -250,15 +263,22 @@ void RigidContacts::start_row(ContactRow& row, std::span<const BodyState> bodies
 
 void RigidContacts::finish(std::span<BodyState> bodies, double dt, double slow, const RunContext& context) {
     if (rows_.empty()) return;
+    const auto is_touching = [&](const ContactRow& row) { // now; what only came nearer is left alone
+        if (row.impulse[0] > 0) return true;
+        const bool is_of_sleeper = row.movers[0] == 0 || (row.movers[1] == 0 && points_[row.point].other != kNoIndex);
+        if (is_of_sleeper || !(row.approach < -float(slow))) return false;
+        const float along = row.speeds(changes_[row.movers[0]], changes_[row.movers[1]])[0];
+        const float spacing = float(bodies[points_[row.point].body].body->spacing());
+        return row.separation + float(dt) * along < kTouches * spacing;
+    };
     for (ContactRow& row : rows_)
         row.target = row.approach < -float(slow) ? -points_[row.point].restitution * row.approach : 0;
-    // What did not push is left alone: it may be slowed down only where it also bounces.
     parallel_for(context, islands_.size() - 1, kIslandsGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             const std::span rows = std::span(swept_).subspan(islands_[k], islands_[k + 1] - islands_[k]);
             std::size_t pushing = 0;
             for (Index r = islands_[k]; r < islands_[k + 1]; ++r)
-                if (rows_[r].impulse[0] > 0) rows[pushing++] = r;
+                if (is_touching(rows_[r])) rows[pushing++] = r;
             sweep_until_still(rows.first(pushing), kMostRowsSwept / 2, float(kStill * (10 * dt)));
         }
     });

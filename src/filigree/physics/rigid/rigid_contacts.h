@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/physics/body/body_state.h"
+#include "filigree/physics/rigid/contact_manifold.h"
 #include "filigree/physics/rigid/contact_rows.h"
 
 #include <span>
@@ -55,6 +56,7 @@ private:
         Mat3f inverse_inertia = Mat3f::Zero();
         float inverse_mass = 0;
     };
+    static std::vector<ManifoldPoint> manifold_points(std::span<const ContactPoint> points, const RigidPose& pose);
     void reduce_on_obstacles(std::span<const BodyState> bodies);
     Index mover_of(std::span<const BodyState> bodies, Index body);
     void find_islands();

@@ -16,6 +16,10 @@ constexpr float kFarthestWay = 1;        ///< spacings that two bodies near each
 constexpr float kMostGained = 0.25f;     ///< spacings that points are looked for further away beside a blow
 /// Spacings that points are looked for further outside, so that they serve for more than one substep.
 constexpr float kLeastFurther = 0.04f, kMostFurther = 0.2f;
+constexpr float kSameNormal = 0.9999f, kLeaning = 0.5f; ///< cosines, of flatten
+/// Spacings: that a point may be taken further out or in, and how far below the plane matter has to be within how much
+/// beside the point.
+constexpr float kFlat = 0.04f, kDeepened = 0.02f, kBelow = 0.1f, kBesideEdge = 0.02f;
 constexpr float kMayGain = 1.2f; ///< what comes may become so much faster within a substep
 constexpr float kAcross = 0.05f; ///< spacings: nearer points take part whether they come nearer or not
 
@@ -43,8 +47,9 @@ public:
     Vec3f operator()(const Vec3f& point) const { return turn_ * point + shift_; }
     const Mat3f& turn() const { return turn_; }
     const Vec3f& shift() const { return shift_; }
-    /// How much it turns more or less than another.
-    float turned(const AxesMap& other) const { return (turn_ - other.turn_).norm(); }
+    Vec3f back(const Vec3f& point) const { return turn_.transpose() * (point - shift_); }
+    /// m, at most, that a point 1 m from a centre goes beside that by the turn from another map to this.
+    float turned(const AxesMap& other) const { return std::sqrt(0.5f) * (turn_ - other.turn_).norm(); }
 
 private:
     Mat3f turn_;
@@ -187,10 +192,9 @@ bool RigidPairs::search(std::span<BodyState> bodies, double longest, const RunCo
 /// the distance until there. What passes by a corner is not pushed.
 bool RigidPairs::meets_on_its_way(const RigidShape& shape, const Vec3f& at, const Vec3f& velocity,
                                   DistanceField::Sample& surface) const {
-    const auto step = float(step_);
     if (surface.distance < kAcross * float(shape.body().spacing())) return true;
-    if (-step * velocity.dot(surface.normal) < surface.distance) return true; // not at this speed; it may be pushed
-    const Vec3f way = step * velocity;
+    const Vec3f way = float(step_) * velocity;
+    if (-way.dot(surface.normal) < surface.distance) return true; // not at this speed; it may be pushed
     const float part = shape.first_touch(at, way);
     if (!(part <= 1)) return false;
     const Vec3f normal = shape.surface(at + part * way).normal;
@@ -205,9 +209,9 @@ RigidPairs::AxesMap RigidPairs::to_axes(Index body, Index other) const { return 
 float RigidPairs::moved(const Pair& pair, const AxesMap& map) const {
     const AxesMap before(pair.beside);
     const RigidShape &a = *shapes_[pair.body], &b = *shapes_[pair.other];
-    const float across = (placed_[pair.body].box_centre - placed_[pair.other].box_centre).norm();
-    return map.turned(before) * (a.half().norm() + b.half().norm() + across) +
-           (map(a.centre()) - before(a.centre())).norm();
+    const float turned = map.turned(before);
+    return std::max(turned * a.half().norm() + (map(a.centre()) - before(a.centre())).norm(),
+                    turned * b.half().norm() + (map.back(b.centre()) - before.back(b.centre())).norm());
 }
 
 /// Points of one body in the field of the other.
@@ -230,11 +234,51 @@ void RigidPairs::add_near_points(const Pair& pair, bool of_other, const AxesMap&
             return;
         }
         const Vec3f normal = b.turn * surface.normal;
-        found.points.push_back({.place = place, .normal = of_other ? -normal : normal, .separation = surface.distance});
+        const float comes = std::max(0.0f, -velocity.dot(normal));
+        found.points.push_back({.place = place,
+                                .normal = of_other ? -normal : normal,
+                                .separation = surface.distance - float(step_) * comes});
         found.memory.push_back({.number = number, .separation = surface.distance, .at = at, .normal = surface.normal});
         if (is_known) found.points.back().force = known->force;
         if (surface.distance < 0) found.memory.back().entry = surface.normal;
     });
+}
+
+/// A field's normals lean outwards at its body's edges, so that bodies of one size would push each other aside. What
+/// touches as the surface that most others touch goes on does so along its normal. The two bodies' surfaces there are
+/// taken as planes.
+void RigidPairs::flatten(const Pair& pair, float spacing, Candidates& found) const {
+    Vec3f all = Vec3f::Zero();
+    for (const ManifoldPoint& point : found.points) all += point.normal;
+    std::size_t best = 0;
+    for (std::size_t k = 1; k < found.points.size(); ++k)
+        if (found.points[k].normal.dot(all) > found.points[best].normal.dot(all)) best = k;
+    if (found.points.empty()) return;
+    const Vec3f normal = found.points[best].normal;
+    const float height = found.points[best].place.dot(normal), between = found.memory[best].separation;
+    const bool is_of_first = !is_of_other(found.memory[best].number);
+    const float first = is_of_first ? height : height + between, other = is_of_first ? height - between : height;
+    for (std::size_t k = 0; k < found.points.size(); ++k) {
+        ManifoldPoint& point = found.points[k];
+        Point& memory = found.memory[k];
+        const float alike = point.normal.dot(normal), at = point.place.dot(normal);
+        if (alike > kSameNormal || !(alike > kLeaning)) continue;
+        const bool of_other = is_of_other(memory.number);
+        const float separation = of_other ? first - at : at - other;
+        const Vec3f rest_normal = of_other ? Vec3f(-(placed_[pair.body].turn.transpose() * normal))
+                                           : Vec3f(placed_[pair.other].turn.transpose() * normal);
+        const Vec3f below = memory.at - (separation + kBelow * spacing) * rest_normal;
+        const RigidShape& matter = *shapes_[of_other ? pair.body : pair.other];
+        const float further = separation - memory.separation;
+        if (!(further > -kDeepened * spacing && further < kFlat * spacing) ||
+            !(matter.distance(below) < kBesideEdge * spacing))
+            continue;
+        point.separation += further;
+        point.normal = normal;
+        memory.separation = separation;
+        memory.normal = rest_normal;
+        memory.entry = separation < 0 ? memory.normal : Vec3f(Vec3f::Zero());
+    }
 }
 
 /// Leaves the points that are solved, and those whose entry is remembered.
@@ -250,7 +294,8 @@ void RigidPairs::find_points(Pair& pair, std::span<const BodyState> bodies, Cand
         pair.beside = map.numbers();
         add_near_points(pair, false, map, bodies, found);
         add_near_points(pair, true, back, bodies, found);
-        reduce_manifold(found.points, pair.margin);
+        flatten(pair, spacing, found);
+        reduce_manifold(found.points, kManifoldScale * spacing);
         pair.points.clear();
         for (std::size_t k = 0; k < found.points.size(); ++k) {
             Point& point = found.memory[k];

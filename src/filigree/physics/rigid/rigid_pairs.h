@@ -103,6 +103,7 @@ private:
     float moved(const Pair& pair, const AxesMap& map) const;
     void add_near_points(const Pair& pair, bool of_other, const AxesMap& map, std::span<const BodyState> bodies,
                          Candidates& found) const;
+    void flatten(const Pair& pair, float spacing, Candidates& found) const;
     void find_points(Pair& pair, std::span<const BodyState> bodies, Candidates& found) const;
     void follow_points(Pair& pair, const AxesMap& map, const AxesMap& back) const;
     Vec3f world_place(const Pair& pair, const Point& point) const;

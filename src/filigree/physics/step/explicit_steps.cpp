@@ -317,7 +317,10 @@ private:
         }
         rigid_loads_.resize(bodies_.size());
         each_awake([&](const BodyState& body, std::size_t b) {
-            if (body.rigid) rigid_loads_[b] = rigid_load(body);
+            if (!body.rigid) return;
+            const bool is_loaded =
+                is_pushed_by_penalty(b) || state_.external.has_wind() || state_.external.acts_on(b, now_);
+            rigid_loads_[b] = is_loaded || !state_.cracks.empty() ? rigid_load(body) : RigidLoad{};
         });
         is_finite_ = true;
         for (std::size_t b = 0; b < bodies_.size(); ++b) {
