@@ -266,7 +266,7 @@ void RigidContacts::finish(std::span<BodyState> bodies, double dt, double slow, 
     const auto is_touching = [&](const ContactRow& row) { // now; what only came nearer is left alone
         if (row.impulse[0] > 0) return true;
         const bool is_of_sleeper = row.movers[0] == 0 || (row.movers[1] == 0 && points_[row.point].other != kNoIndex);
-        if (is_of_sleeper || !(row.approach < -float(slow))) return false;
+        if (is_of_sleeper) return false;
         const float along = row.speeds(changes_[row.movers[0]], changes_[row.movers[1]])[0];
         const float spacing = float(bodies[points_[row.point].body].body->spacing());
         return row.separation + float(dt) * along < kTouches * spacing;

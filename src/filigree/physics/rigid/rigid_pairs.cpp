@@ -16,10 +16,10 @@ constexpr float kFarthestWay = 1;        ///< spacings that two bodies near each
 constexpr float kMostGained = 0.25f;     ///< spacings that points are looked for further away beside a blow
 /// Spacings that points are looked for further outside, so that they serve for more than one substep.
 constexpr float kLeastFurther = 0.04f, kMostFurther = 0.2f;
-constexpr float kSameNormal = 0.9999f, kLeaning = 0.5f; ///< cosines, of flatten
-/// Spacings: that a point may be taken further out or in, and how far below the plane matter has to be within how much
-/// beside the point.
-constexpr float kFlat = 0.04f, kDeepened = 0.02f, kBelow = 0.1f, kBesideEdge = 0.02f;
+constexpr float kSameNormal = 0.9999f, kLeaning = -0.1f; ///< cosines, of flatten
+/// Spacings: that a point may be taken further out or in; how far below the plane matter has to be within how much
+/// beside the point; and what counts as level with the plane.
+constexpr float kFlat = 0.04f, kDeepened = 0.02f, kBelow = 0.1f, kBesideEdge = 0.02f, kLevel = 0.02f;
 constexpr float kMayGain = 1.2f; ///< what comes may become so much faster within a substep
 constexpr float kAcross = 0.05f; ///< spacings: nearer points take part whether they come nearer or not
 
@@ -245,8 +245,8 @@ void RigidPairs::add_near_points(const Pair& pair, bool of_other, const AxesMap&
 }
 
 /// A field's normals lean outwards at its body's edges, so that bodies of one size would push each other aside. What
-/// touches as the surface that most others touch goes on does so along its normal. The two bodies' surfaces there are
-/// taken as planes.
+/// touches as the surface that most others touch goes on does so along its normal; what lies level with it beside an
+/// edge touches nothing, or nothing could slide. The two bodies' surfaces there are taken as planes.
 void RigidPairs::flatten(const Pair& pair, float spacing, Candidates& found) const {
     Vec3f all = Vec3f::Zero();
     for (const ManifoldPoint& point : found.points) all += point.normal;
@@ -258,27 +258,33 @@ void RigidPairs::flatten(const Pair& pair, float spacing, Candidates& found) con
     const float height = found.points[best].place.dot(normal), between = found.memory[best].separation;
     const bool is_of_first = !is_of_other(found.memory[best].number);
     const float first = is_of_first ? height : height + between, other = is_of_first ? height - between : height;
+    std::size_t kept = 0;
     for (std::size_t k = 0; k < found.points.size(); ++k) {
-        ManifoldPoint& point = found.points[k];
-        Point& memory = found.memory[k];
+        ManifoldPoint point = found.points[k];
+        Point memory = found.memory[k];
         const float alike = point.normal.dot(normal), at = point.place.dot(normal);
-        if (alike > kSameNormal || !(alike > kLeaning)) continue;
-        const bool of_other = is_of_other(memory.number);
-        const float separation = of_other ? first - at : at - other;
-        const Vec3f rest_normal = of_other ? Vec3f(-(placed_[pair.body].turn.transpose() * normal))
-                                           : Vec3f(placed_[pair.other].turn.transpose() * normal);
-        const Vec3f below = memory.at - (separation + kBelow * spacing) * rest_normal;
-        const RigidShape& matter = *shapes_[of_other ? pair.body : pair.other];
-        const float further = separation - memory.separation;
-        if (!(further > -kDeepened * spacing && further < kFlat * spacing) ||
-            !(matter.distance(below) < kBesideEdge * spacing))
-            continue;
-        point.separation += further;
-        point.normal = normal;
-        memory.separation = separation;
-        memory.normal = rest_normal;
-        memory.entry = separation < 0 ? memory.normal : Vec3f(Vec3f::Zero());
+        if (alike < kSameNormal && alike > kLeaning) {
+            const bool of_other = is_of_other(memory.number);
+            const float separation = of_other ? first - at : at - other, further = separation - memory.separation;
+            const Vec3f rest_normal = of_other ? Vec3f(-(placed_[pair.body].turn.transpose() * normal))
+                                               : Vec3f(placed_[pair.other].turn.transpose() * normal);
+            const RigidShape& matter = *shapes_[of_other ? pair.body : pair.other];
+            const Vec3f below = memory.at - (separation + kBelow * spacing) * rest_normal;
+            const bool is_beside = !(matter.distance(below) < kBesideEdge * spacing);
+            if (is_beside && std::abs(separation) < kLevel * spacing) continue;
+            if (!is_beside && further > -kDeepened * spacing && further < kFlat * spacing) {
+                point.separation += further;
+                point.normal = normal;
+                memory.separation = separation;
+                memory.normal = rest_normal;
+                memory.entry = separation < 0 ? memory.normal : Vec3f(Vec3f::Zero());
+            }
+        }
+        found.points[kept] = point;
+        found.memory[kept++] = memory;
     }
+    found.points.resize(kept);
+    found.memory.resize(kept);
 }
 
 /// Leaves the points that are solved, and those whose entry is remembered.
