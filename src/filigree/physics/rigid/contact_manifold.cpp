@@ -7,7 +7,7 @@ namespace filigree {
 
 namespace {
 
-constexpr float kLeastWeight = 0.01f;
+constexpr float kLeastManifoldWeight = 0.01f;
 constexpr float kSimilar = 0.9f;    ///< cosine between the normals of a group and its deepest point's
 constexpr float kKeptBefore = 1.1f; ///< a point that pushed counts as so much further out ...
 constexpr float kKeptDeeper = 0.1f; ///< ... and as so much of the scale deeper
@@ -33,7 +33,7 @@ private:
     /// What comes less near counts for less.
     float weight(const ManifoldPoint& point) const {
         const float further = point.separation - deepest_.separation;
-        const float near = std::max(kLeastWeight, 1 - further / std::max(scale_, 1e-12f));
+        const float near = std::max(kLeastManifoldWeight, 1 - further / std::max(scale_, 1e-12f));
         return point.force.isZero(0) ? near : kKeptBefore * near;
     }
     /// Null where nothing scores.
