@@ -1,5 +1,8 @@
 // Rigid bodies that hit, stack and carry: restitution, mass ratios and stacks are what was asked.
+#include "../../bench/heap.h"
+
 #include "filigree/mesh/shapes.h"
+#include "filigree/physics/rigid/contact_manifold.h"
 #include "filigree/physics/simulation.h"
 #include "simulation_scenes.h"
 #include "test_bodies.h"
@@ -108,6 +111,54 @@ TEST(RigidContact, TenStoneCubesStand) {
         const Vec3d off = centre_of_mass(stack, b) - Vec3d(0.2, 0.2 + 0.4 * double(b), 0.2);
         EXPECT_LT(off.norm(), 1e-3) << b;
     }
+}
+
+/// Of meshes, whose fields lean at their edges.
+TEST(RigidContact, TenCubesOfOneMeshStand) {
+    World world;
+    world.obstacles.emplace_back().shape = HalfSpace{};
+    const auto cube = body_of(make_box({0.2, 0.2, 0.2}, {0.4, 0.4, 0.4}), 200);
+    std::vector<Actor> cubes;
+    for (int i = 0; i < 10; ++i) cubes.push_back(actor(cube, Vec3d(0, 0.401 * i, 0)));
+    Simulation stack = simulation(world, cubes);
+    run(stack, 300);
+    for (std::size_t b = 0; b < 10; ++b) {
+        const Vec3d off = centre_of_mass(stack, b) - Vec3d(0.2, 0.2 + 0.4 * double(b), 0.2);
+        EXPECT_LT(off.norm(), 5e-4) << b;
+    }
+}
+
+TEST(RigidContact, AHeapOfTwoHundredStaysOutOfItselfAndFallsAsleep) {
+    const bench::Heap scene = bench::make_heap();
+    Simulation heap = simulation(scene.world, scene.actors);
+    double before = heap.energy(kContext).total();
+    for (int frame = 0; frame < 240; ++frame) {
+        const FrameReport report = heap.advance(kContext).value();
+        EXPECT_LT(report.deepest_in_matter, 0.01) << frame;
+        EXPECT_LT(report.deepest_contact, 0.01) << frame;
+        const double now = heap.energy(kContext).total();
+        EXPECT_LT(now, 1.0005 * before) << frame;
+        before = now;
+    }
+    const FrameReport report = heap.advance(kContext).value();
+    EXPECT_EQ(report.contacts, 0U) << "something is awake";
+    EXPECT_EQ(heap.energy(kContext).kinetic, 0);
+}
+
+TEST(RigidContact, AManifoldIsTheDeepestPointAndTheCornersAndKeepsAllForce) {
+    std::vector<ManifoldPoint> grid;
+    for (int i = 0; i < 25; ++i)
+        grid.push_back({.place = Vec3f(float(i % 5), 0, float(i / 5)), .normal = Vec3f::UnitY(), .separation = 1e-3f});
+    grid[0].separation = -0.05f;
+    grid[12].force = {1, 10, 2};
+    grid[23].force = {0, 5, 0};
+    reduce_manifold(grid, 0.1f);
+    Vec3f force = Vec3f::Zero();
+    for (std::size_t k = 0; k < grid.size(); ++k) {
+        EXPECT_EQ(grid[k].is_kept, k == 0 || k == 4 || k == 20 || k == 24) << k;
+        if (grid[k].is_kept) force += grid[k].force;
+    }
+    EXPECT_TRUE(force.isApprox(Vec3f(1, 15, 2)));
 }
 
 TEST(RigidContact, AHeavyCubeStandsOnALightOne) {

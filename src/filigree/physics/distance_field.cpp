@@ -239,6 +239,27 @@ void DistanceField::cut(const DistanceField& other, float radius) {
             }
 }
 
+float DistanceField::distance(const Vec3f& point) const {
+    const Vec3f low = box_.min.cast<float>(), high = box_.max.cast<float>();
+    const Vec3f within = point.cwiseMax(low).cwiseMin(high), x = (within - corner_) * (1 / spacing_);
+    std::size_t cube[3];
+    float t[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        const float last = float(counts_[axis] - 2), whole = std::min(x[axis] > 0 ? x[axis] : 0.0f, last);
+        cube[axis] = std::size_t(std::int32_t(whole));
+        t[axis] = std::min(x[axis] - float(std::int32_t(whole)), 1.0f);
+    }
+    const std::size_t dy = counts_[0], dz = counts_[0] * counts_[1];
+    const float* d = &distances_[cube[2] * dz + cube[1] * dy + cube[0]];
+    const auto mix = [](float a, float b, float s) { return a + s * (b - a); };
+    const float y0 = mix(mix(d[0], d[1], t[0]), mix(d[dy], d[dy + 1], t[0]), t[1]);
+    const float y1 = mix(mix(d[dz], d[dz + 1], t[0]), mix(d[dz + dy], d[dz + dy + 1], t[0]), t[1]);
+    const float inside = mix(y0, y1, t[2]), beyond = (point - within).squaredNorm();
+    if (beyond == 0) return inside;
+    const float way = std::sqrt(beyond);
+    return std::max(way, inside - way);
+}
+
 DistanceField::Sample DistanceField::at(const Vec3f& point) const {
     const Vec3f up = Vec3f::UnitY();
     if (!point.allFinite()) return {std::numeric_limits<float>::infinity(), up};

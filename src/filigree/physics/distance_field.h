@@ -24,7 +24,8 @@ public:
 
     /// Outside the grid a lower bound: the distance to the grid, or what the border's distance leaves of it.
     Sample at(const Vec3f& point) const;
-    const Box& box() const { return box_; } ///< of the grid
+    float distance(const Vec3f& point) const; ///< that of at(point), to rounding, and sooner
+    const Box& box() const { return box_; }   ///< of the grid
     /// Leaves what is also inside of another field's body, to `radius` around its surface: the larger distance of both.
     void cut(const DistanceField& other, float radius);
 

@@ -33,7 +33,9 @@ struct Contacts::Ahead {
     /// m that a pair may go in the next substep. What points are followed beside has to be found before; half-spaces
     /// stop also what is found below them.
     float in_step(const ContactPair& pair) const {
-        return pair.is_traced ? kFaster * ((pair.speed + gained) * step + obstacle_step[obstacle_of(pair)]) : 0;
+        return pair.is_traced || pair.is_rigid
+                   ? kFaster * ((pair.speed + gained) * step + obstacle_step[obstacle_of(pair)])
+                   : 0;
     }
     /// m that a pair may go until it is searched again.
     float reach(const ContactPair& pair) const {

@@ -17,7 +17,6 @@ constexpr std::size_t kTouchGrain = 4; // blocks
 /// 0.34 spacings deep to 0.29.
 constexpr float kWithinOneBody = 1.5f;
 constexpr float kEdgeSlack = 0.1f;  ///< spacings: so deep an edge may be in what surface points carry
-constexpr float kMostMargin = 0.5f; ///< spacings, of two rigid bodies
 constexpr float kLongestWay = 0.3f; ///< spacings a substep that one body may go towards another
 
 } // namespace
@@ -135,9 +134,7 @@ void Contacts::with_sides(const ContactPair& pair, std::span<BodyState> bodies, 
 
 /// m outside, at which a point of a rigid pair counts as touching.
 float Contacts::margin_of(const ContactPair& pair) {
-    if (!pair.is_rigid) return 0;
-    const float margin = touching_margin(pair.spacing, pair.speed);
-    return pair.is_of_bodies() ? std::min(margin, kMostMargin * pair.spacing) : margin;
+    return pair.is_rigid ? touching_margin(pair.spacing, pair.speed) : 0;
 }
 
 /// The force on a point; minus it is that on what it touches. Lets friction's anchor begin, slide and end. Of a rigid
@@ -201,10 +198,7 @@ ContactPoint Contacts::contact_point(ContactPair& pair, Candidate& at, const Vec
         else if (pair.touched.is_obstacle())
             point.other_velocity = touched.velocity(at, point.place);
     });
-    if (pair.is_of_bodies())
-        point.other = pair.touched.number();
-    else
-        point.obstacle = is_edge ? pair.points.number() : pair.touched.number();
+    point.obstacle = is_edge ? pair.points.number() : pair.touched.number();
     return point;
 }
 

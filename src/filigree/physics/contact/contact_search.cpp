@@ -196,7 +196,7 @@ void Contacts::find_pairs(std::span<const BodyState> bodies, float least_reach, 
         const ColliderId body = ColliderId::body(meeting[sweep.order()[a]]);
         sweep.each_near(a, around, room, [&](std::size_t b) {
             const ColliderId other = ColliderId::body(meeting[sweep.order()[b]]);
-            if (other == body) return;
+            if (other == body || (bodies[body.number()].rigid && bodies[other.number()].rigid)) return; // RigidPairs'
             add(body, other);
             add(other, body);
         });
@@ -218,8 +218,9 @@ void Contacts::search(std::span<BodyState> bodies, const Search& search, const R
     forget_jumps(search.time);
     const ObstaclePoses poses(world_, search.time);
     const Ahead ahead(world_, bodies, search);
-    const bool follows = std::ranges::any_of(shapes_, &ObstacleShape::is_traced);
-    const float next = follows ? ahead.in_step_of_all(relative_speed_of_all(bodies)) : 0;
+    const bool looks_ahead = std::ranges::any_of(shapes_, &ObstacleShape::is_traced) ||
+                             std::ranges::any_of(bodies, [](const BodyState& body) { return body.rigid.has_value(); });
+    const float next = looks_ahead ? ahead.in_step_of_all(relative_speed_of_all(bodies)) : 0;
     bool changed = travelled_ + next > reach_;
     if (changed) find_pairs(bodies, 2 * next, ahead, poses, context);
     const bool woke = wake_touched(bodies);

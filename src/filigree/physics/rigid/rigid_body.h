@@ -5,10 +5,10 @@
 
 namespace filigree {
 
-/// Squared frequency that contacts with soft bodies and obstacles' edges give a rigid body at most, 1/s^2: 16 substeps a
-/// frame at 60 frames a second.
+/// Squared frequency that contacts with soft bodies and obstacles' edges give a rigid body at most, 1/s^2: 16 substeps
+/// a frame at 60 frames a second.
 inline constexpr float kRigidSquaredFrequency = 0.99e6f;
-inline constexpr float kLongestRigidStep = 1.05e-3f; ///< s, of substeps that this allows
+inline constexpr float kLongestRigidStep = 4.2e-3f; ///< s, of substeps of rigid bodies: 4 a frame, else
 
 /// The same particles and surface, of a material that does not deform. body: of fem or springs.
 Body as_rigid(const Body& body);

@@ -2,11 +2,13 @@
 // 2019.
 #include "filigree/physics/rigid/rigid_contacts.h"
 
+#include "filigree/core/disjoint_sets.h"
+#include "filigree/core/parallel_for.h"
 #include "filigree/physics/rigid/rigid_body.h"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <numeric>
 #include <utility>
 
 namespace filigree {
@@ -17,8 +19,10 @@ constexpr double kCorrected = 0.2;       ///< part of a penetration that a subst
 constexpr double kFastestCorrection = 3; ///< m/s: ... no faster than this
 constexpr double kDeep = 0.5;            ///< spacings; deeper there is no such limit
 constexpr double kSlop = 2e-3;           ///< spacings of penetration that are left, so that what rests keeps touching
-constexpr std::size_t kFewestSweeps = 4, kMostSweeps = 400, kMostRowsSwept = 16000;
-constexpr double kStill = 1e-4; ///< of what gravity adds in a substep: a smaller change of velocity ends the sweeps
+constexpr std::size_t kFewestSweeps = 3, kMostSweeps = 400, kMostRowsSwept = 8000;
+constexpr std::size_t kIslandsGrain = 8, kRowsGrain = 128;
+constexpr float kTouches = 0.005f; ///< spacings outside: what has come so near bounces as what pushes does
+constexpr double kStill = 1e-4;    ///< of what gravity adds in a substep: a smaller change of velocity ends the sweeps
 
 /// m/s that take a part of a penetration away in dt. What came deep into an obstacle, faster than a substep can see, is
 /// out soon.
@@ -27,6 +31,12 @@ double correction(double depth, double spacing, bool in_obstacle, double dt) {
     return in_obstacle && depth > kDeep * spacing ? wanted : std::min(kFastestCorrection, wanted);
 }
 
+ContactRow::Four four_of(const Vec3f& v) {
+    const ContactRow::Four four = {v.x(), v.y(), v.z(), 0};
+    return four;
+}
+Vec3f vector_of(const ContactRow::Four& v) { return {v[0], v[1], v[2]}; }
+
 } // namespace
 
 float touching_margin(float spacing, float speed) {
@@ -34,175 +44,255 @@ float touching_margin(float spacing, float speed) {
     return kLeast * spacing + kFaster * kLongestRigidStep * speed;
 }
 
+/// What has to be said of points of one body on obstacles for a manifold.
+std::vector<ManifoldPoint> RigidContacts::manifold_points(std::span<const ContactPoint> points, const RigidPose& pose) {
+    const Mat3d turn = pose.turn.toRotationMatrix();
+    const Vec3d spin = turn * (pose.inverse_inertia * (turn.transpose() * pose.angular));
+    std::vector<ManifoldPoint> manifold;
+    for (const ContactPoint& point : points) {
+        const Vec3d velocity = pose.velocity + spin.cross(point.place.cast<double>() - pose.centre);
+        const float comes = (point.other_velocity - velocity.cast<float>()).dot(point.normal);
+        manifold.push_back(
+            {point.place, point.normal, point.separation - kLongestRigidStep * std::max(0.0f, comes), *point.force});
+    }
+    return manifold;
+}
+
+/// Points on obstacles come body by body.
+void RigidContacts::reduce_on_obstacles(std::span<const BodyState> bodies) {
+    std::size_t kept = 0;
+    for (std::size_t from = 0, to = 0; from < points_.size(); from = to) {
+        const Index body = points_[from].body;
+        const auto belongs = [&](const ContactPoint& point) { return point.body == body && point.other == kNoIndex; };
+        for (to = from + 1; to < points_.size() && belongs(points_[from]) && belongs(points_[to]);) ++to;
+        if (to - from <= kMostInManifold) {
+            while (from < to) points_[kept++] = points_[from++];
+            continue;
+        }
+        std::vector<ManifoldPoint> manifold =
+            manifold_points(std::span(points_).subspan(from, to - from), *bodies[body].rigid);
+        reduce_manifold(manifold, kManifoldScale * float(bodies[body].body->spacing()));
+        for (const ManifoldPoint& point : manifold) {
+            const ContactPoint& of = points_[from++];
+            *of.force = point.force;
+            if (!point.is_kept && of.holds) *of.holds = false;
+            if (point.is_kept) points_[kept++] = of;
+        }
+    }
+    points_.resize(kept);
+}
+
 Index RigidContacts::mover_of(std::span<const BodyState> bodies, Index body) {
-    if (bodies[body].sleeps()) return kNoIndex;
+    if (body == kNoIndex || bodies[body].sleeps()) return 0;
     Index& mover = mover_of_body_[body];
-    if (mover != kNoIndex) return mover;
+    if (mover != 0) return mover;
     mover = Index(movers_.size());
     const RigidPose& pose = *bodies[body].rigid;
-    const Mat3d r = pose.turn.toRotationMatrix();
     Mover& made = movers_.emplace_back();
-    made.inverse_inertia = r * pose.inverse_inertia * r.transpose();
-    made.inverse_mass = 1 / pose.mass;
-    made.velocity = pose.velocity;
-    made.spin = made.inverse_inertia * pose.angular;
-    body_of_mover_.push_back(body);
+    made.body = body;
+    made.turn = pose.turn.toRotationMatrix();
+    const Mat3f r = made.turn.cast<float>();
+    made.inverse_inertia = r * pose.inverse_inertia.cast<float>() * r.transpose();
+    made.inverse_mass = float(1 / pose.mass);
     return mover;
 }
 
-Vec3d RigidContacts::relative_velocity(const Row& row) const {
-    Vec3d velocity = -row.other_velocity;
-    if (row.body != kNoIndex) velocity += movers_[row.body].velocity + movers_[row.body].spin.cross(row.arm);
-    if (row.other != kNoIndex) velocity -= movers_[row.other].velocity + movers_[row.other].spin.cross(row.other_arm);
-    return velocity;
+/// Rows of bodies that touch each other, directly or by others, one after the other.
+void RigidContacts::find_islands() {
+    DisjointSets sets(movers_.size());
+    for (const Touching& row : touching_)
+        if (row.body != 0 && row.other != 0) sets.join(row.body, row.other);
+    const auto island = [&](const Touching& row) { return sets.root(row.body != 0 ? row.body : row.other); };
+    std::vector<Index> first(movers_.size() + 1, 0);
+    for (const Touching& row : touching_) ++first[island(row) + 1];
+    islands_.clear();
+    for (std::size_t k = 0; k + 1 < first.size(); ++k) {
+        if (first[k + 1] > 0) islands_.push_back(first[k]);
+        first[k + 1] += first[k];
+    }
+    islands_.push_back(Index(touching_.size()));
+    sorted_.resize(touching_.size());
+    for (const Touching& row : touching_) sorted_[first[island(row)]++] = row;
 }
 
-void RigidContacts::push(const Row& row, const Vec3d& impulse) {
-    if (row.body != kNoIndex) {
-        Mover& mover = movers_[row.body];
-        mover.velocity += mover.inverse_mass * impulse;
-        mover.spin += mover.inverse_inertia * row.arm.cross(impulse);
-    }
-    if (row.other != kNoIndex) {
-        Mover& mover = movers_[row.other];
-        mover.velocity -= mover.inverse_mass * impulse;
-        mover.spin -= mover.inverse_inertia * row.other_arm.cross(impulse);
+void RigidContacts::begin_answer(ContactRow::Answer& answer, const ContactRow& row, Index mover,
+                                 const Vec3d& arm) const {
+    const Mover& moved = movers_[mover];
+    const Vec3f at = arm.cast<float>();
+    answer.speed = moved.inverse_mass;
+    for (int k = 0; k < 3; ++k) {
+        const Vec3f turning = at.cross(vector_of(row.direction[k]));
+        answer.arm[k] = four_of(turning);
+        answer.spin[k] = four_of(moved.inverse_inertia * turning);
     }
 }
 
-void RigidContacts::prepare(std::span<const BodyState> bodies) {
-    rows_.clear();
-    movers_.clear();
-    body_of_mover_.clear();
-    mover_of_body_.assign(bodies.size(), kNoIndex);
+/// m/s, of the body beside the other, before impulses.
+Vec3d RigidContacts::velocity_before(const ContactRow& row, const Vec3d& arm, const Vec3d& other_arm) const {
+    const Mover &a = movers_[row.movers[0]], &b = movers_[row.movers[1]];
+    return a.velocity + a.spin.cross(arm) - b.velocity - b.spin.cross(other_arm) -
+           points_[row.point].other_velocity.cast<double>();
+}
+
+void RigidContacts::begin_row(ContactRow& row, std::span<const BodyState> bodies, const Vec3d& gravity) const {
+    const ContactPoint& point = points_[row.point];
+    const Vec3d place = point.place.cast<double>(), arm = place - bodies[point.body].rigid->centre;
+    const Vec3d other_arm = point.other == kNoIndex ? Vec3d::Zero() : Vec3d(place - bodies[point.other].rigid->centre);
+    const Vec3f tangent = point.normal.unitOrthogonal();
+    row.direction[0] = four_of(point.normal);
+    row.direction[1] = four_of(tangent);
+    row.direction[2] = four_of(point.normal.cross(tangent));
+    row.separation = point.separation;
+    row.friction = point.friction;
+    begin_answer(row.body, row, row.movers[0], arm);
+    begin_answer(row.other, row, row.movers[1], other_arm);
+    const auto answer = [&](int pushed, int along) { // m/s along one direction of an impulse along another
+        const ContactRow::Four sum =
+            row.body.arm[along] * row.body.spin[pushed] + row.other.arm[along] * row.other.spin[pushed];
+        return sum[0] + sum[1] + sum[2] + (pushed == along ? row.body.speed + row.other.speed : 0);
+    };
+    for (int k = 0; k < 3; ++k) row.mass[k] = 1 / answer(k, k);
+    for (int k = 0; k < 2; ++k) row.beside[k] = answer(0, k + 1);
+    const Vec3d normal = point.normal.cast<double>();
+    double approach = velocity_before(row, arm, other_arm).dot(normal);
+    if (approach < 0 && (row.movers[0] == 0 || row.movers[1] == 0)) {
+        const double towards = (row.movers[0] == 0 ? 1 : -1) * gravity.dot(normal);
+        approach = -std::sqrt(std::max(0.0, approach * approach + 2 * towards * double(row.separation)));
+    }
+    row.approach = float(approach);
+}
+
+void RigidContacts::take_velocities(std::span<const BodyState> bodies) {
+    for (std::size_t k = 1; k < movers_.size(); ++k) {
+        Mover& mover = movers_[k];
+        const RigidPose& pose = *bodies[mover.body].rigid;
+        mover.velocity = pose.velocity;
+        mover.angular = pose.angular;
+        mover.spin = mover.turn * (pose.inverse_inertia * (mover.turn.transpose() * pose.angular));
+    }
+}
+
+void RigidContacts::prepare(std::span<const BodyState> bodies, const Vec3d& gravity, const RunContext& context) {
+    reduce_on_obstacles(bodies);
+    movers_.assign(1, {});
+    mover_of_body_.assign(bodies.size(), 0);
     is_pushed_.assign(bodies.size(), 0);
-    for (const ContactPoint& point : points_) {
-        Row& row = rows_.emplace_back();
-        row.body = mover_of(bodies, point.body);
-        row.other = point.other == kNoIndex ? kNoIndex : mover_of(bodies, point.other);
-        const Vec3d place = point.place.cast<double>();
-        row.normal = point.normal.cast<double>();
-        row.arm = place - bodies[point.body].rigid->centre;
-        row.other_arm = point.other == kNoIndex ? Vec3d::Zero() : Vec3d(place - bodies[point.other].rigid->centre);
-        row.other_velocity = point.other_velocity.cast<double>();
-        row.separation = double(point.separation);
-        row.tangents[0] = row.normal.unitOrthogonal();
-        row.tangents[1] = row.normal.cross(row.tangents[0]);
-        const auto mass_along = [&](const Vec3d& along) {
-            double gives = 0;
-            const auto add = [&](Index mover, const Vec3d& arm) {
-                if (mover == kNoIndex) return;
-                const Vec3d turning = arm.cross(along);
-                gives += movers_[mover].inverse_mass + turning.dot(movers_[mover].inverse_inertia * turning);
-            };
-            add(row.body, row.arm);
-            add(row.other, row.other_arm);
-            return gives > 0 ? 1 / gives : 0;
-        };
-        row.mass = mass_along(row.normal);
-        for (int k = 0; k < 2; ++k) row.tangent_masses[k] = mass_along(row.tangents[k]);
-        row.approach = relative_velocity(row).dot(row.normal);
+    touching_.clear();
+    for (Index k = 0; k < points_.size(); ++k) {
+        const Index body = mover_of(bodies, points_[k].body), other = mover_of(bodies, points_[k].other);
+        if (body != 0 || other != 0) touching_.push_back({body, other, k});
     }
+    take_velocities(bodies);
+    find_islands();
+    rows_.resize(sorted_.size());
+    parallel_for(context, rows_.size(), kRowsGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            const Touching& touching = sorted_[k];
+            rows_[k].movers[0] = touching.body;
+            rows_[k].movers[1] = touching.other;
+            rows_[k].point = touching.point;
+            begin_row(rows_[k], bodies, gravity);
+        }
+    });
 }
 
-/// Returns by how much the velocity along the normal, or along the surface, changed, m/s.
-double RigidContacts::solve_row(Row& row, double friction) {
-    if (row.mass == 0) return 0;
-    Vec3d velocity = relative_velocity(row);
-    const double pushed = std::max(0.0, row.impulse + row.mass * (row.target - velocity.dot(row.normal)));
-    const double more = pushed - std::exchange(row.impulse, pushed);
-    double most = std::abs(more) / row.mass;
-    if (more != 0) push(row, more * row.normal);
-    if (row.impulse == 0 && row.tangent_impulses[0] == 0 && row.tangent_impulses[1] == 0) return most;
-    velocity = relative_velocity(row);
-    double wanted[2];
-    for (int k = 0; k < 2; ++k)
-        wanted[k] = row.tangent_impulses[k] - row.tangent_masses[k] * velocity.dot(row.tangents[k]);
-    const double limit = friction * row.impulse, length = std::sqrt(wanted[0] * wanted[0] + wanted[1] * wanted[1]);
-    Vec3d impulse = Vec3d::Zero();
-    for (int k = 0; k < 2; ++k) {
-        if (length > limit) wanted[k] *= limit / length;
-        const double part = wanted[k] - std::exchange(row.tangent_impulses[k], wanted[k]);
-        impulse += part * row.tangents[k];
-        most = std::max(most, std::abs(part) / row.tangent_masses[k]);
-    }
-    push(row, impulse);
-    return most;
-}
-
-/// There and back, so that loads travel both ways in one.
-void RigidContacts::sweep_until_still(double tolerance) {
-    const std::size_t sweeps =
-        std::clamp(kMostRowsSwept / std::max<std::size_t>(rows_.size(), 1), kFewestSweeps, kMostSweeps);
+/// There and back, so that loads travel both ways.
+void RigidContacts::sweep_until_still(std::span<const Index> rows, std::size_t most_rows, float tolerance) {
+    if (rows.empty()) return;
+    const std::size_t sweeps = std::clamp(most_rows / rows.size(), kFewestSweeps, kMostSweeps);
     for (std::size_t sweep = 0; sweep < sweeps; ++sweep) {
-        double most = 0;
-        for (std::size_t k = 0; k < rows_.size(); ++k) {
-            const std::size_t row = sweep % 2 == 0 ? k : rows_.size() - 1 - k;
-            most = std::max(most, solve_row(rows_[row], double(points_[row].friction)));
+        float most = 0;
+        for (std::size_t k = 0; k < rows.size(); ++k) {
+            ContactRow& row = rows_[rows[sweep % 2 == 0 ? k : rows.size() - 1 - k]];
+            most = std::max(most, row.solve(changes_[row.movers[0]], changes_[row.movers[1]]));
         }
         if (!(most > tolerance)) return;
     }
 }
 
+/// The velocities with all impulses so far.
 void RigidContacts::write_back(std::span<BodyState> bodies) const {
-    for (std::size_t k = 0; k < movers_.size(); ++k) {
-        RigidPose& pose = *bodies[body_of_mover_[k]].rigid;
-        const Mat3d r = pose.turn.toRotationMatrix();
-        pose.velocity = movers_[k].velocity;
-        pose.angular = r * pose.inverse_inertia.inverse() * r.transpose() * movers_[k].spin;
+    for (std::size_t k = 1; k < movers_.size(); ++k) {
+        const Mover& mover = movers_[k];
+        RigidPose& pose = *bodies[mover.body].rigid;
+        const Vec3d spin = mover.turn.transpose() * vector_of(changes_[k].spin).cast<double>();
+        pose.velocity = mover.velocity + vector_of(changes_[k].velocity).cast<double>();
+        pose.angular = mover.angular + mover.turn * (pose.inverse_inertia.inverse() * spin);
     }
 }
 
-void RigidContacts::solve(std::span<BodyState> bodies, double dt) {
+void RigidContacts::solve(std::span<BodyState> bodies, double dt, const RunContext& context) {
     if (rows_.empty()) return;
-    for (std::size_t k = 0; k < movers_.size(); ++k) {
-        const RigidPose& pose = *bodies[body_of_mover_[k]].rigid;
-        movers_[k].velocity = pose.velocity;
-        movers_[k].spin = movers_[k].inverse_inertia * pose.angular;
-    }
-    for (std::size_t k = 0; k < rows_.size(); ++k) {
-        Row& row = rows_[k];
-        row.target = row.separation > 0 ? -row.separation / dt
-                                        : correction(-row.separation, bodies[points_[k].body].body->spacing(),
-                                                     points_[k].other == kNoIndex, dt);
-        const Vec3d before = dt * points_[k].force->cast<double>();
-        row.impulse = std::max(0.0, before.dot(row.normal));
-        for (int t = 0; t < 2; ++t) row.tangent_impulses[t] = before.dot(row.tangents[t]);
-        if (row.mass > 0 && row.impulse > 0)
-            push(row, row.impulse * row.normal + row.tangent_impulses[0] * row.tangents[0] +
-                          row.tangent_impulses[1] * row.tangents[1]);
-        else
-            row.impulse = row.tangent_impulses[0] = row.tangent_impulses[1] = 0;
-    }
-    sweep_until_still(kStill * (10 * dt));
-    for (std::size_t k = 0; k < rows_.size(); ++k) {
-        if (!(rows_[k].impulse > 0)) continue;
-        is_pushed_[points_[k].body] = 1;
-        if (points_[k].other != kNoIndex) is_pushed_[points_[k].other] = 1;
+    take_velocities(bodies);
+    changes_.assign(movers_.size(), {});
+    swept_.resize(rows_.size());
+    std::iota(swept_.begin(), swept_.end(), Index{0});
+    for (ContactRow& row : rows_) start_row(row, bodies, dt);
+    parallel_for(context, islands_.size() - 1, kIslandsGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k)
+            sweep_until_still(std::span(swept_).subspan(islands_[k], islands_[k + 1] - islands_[k]), kMostRowsSwept,
+                              float(kStill * (10 * dt)));
+    });
+    for (const ContactRow& row : rows_) {
+        if (!(row.impulse[0] > 0)) continue;
+        is_pushed_[points_[row.point].body] = 1;
+        if (points_[row.point].other != kNoIndex) is_pushed_[points_[row.point].other] = 1;
     }
     write_back(bodies);
 }
 
-void RigidContacts::finish(std::span<BodyState> bodies, double dt, double slow) {
-    if (rows_.empty()) return;
-    for (std::size_t k = 0; k < rows_.size(); ++k) {
-        Row& row = rows_[k];
-        // What did not push is left alone: it may be slowed down only where it also bounces.
-        row.target = row.impulse > 0 ? 0 : -std::numeric_limits<double>::infinity();
-        const bool bounces = row.impulse > 0 && row.approach < -slow;
-        if (bounces) row.target = -double(points_[k].restitution) * row.approach;
+/// From the velocities with loads, and the impulse of the substep before.
+void RigidContacts::start_row(ContactRow& row, std::span<const BodyState> bodies, double dt) {
+    const ContactPoint& point = points_[row.point];
+    const Vec3d place = point.place.cast<double>();
+    const Vec3d other_arm = point.other == kNoIndex ? Vec3d::Zero() : Vec3d(place - bodies[point.other].rigid->centre);
+    const Vec3f before = velocity_before(row, place - bodies[point.body].rigid->centre, other_arm).cast<float>();
+    const Vec3f impulse = float(dt) * *point.force;
+    for (int k = 0; k < 3; ++k) {
+        row.start[k] = before.dot(vector_of(row.direction[k]));
+        row.impulse[k] = impulse.dot(vector_of(row.direction[k]));
     }
-    sweep_until_still(kStill * (10 * dt));
-    for (std::size_t k = 0; k < rows_.size(); ++k) {
-        const Row& row = rows_[k];
+    row.target = float(point.separation > 0 ? -double(point.separation) / dt
+                                            : correction(-double(point.separation), bodies[point.body].body->spacing(),
+                                                         point.other == kNoIndex, dt));
+    if (row.impulse[0] > 0)
+        row.push(changes_[row.movers[0]], changes_[row.movers[1]], row.impulse[0], row.impulse[1], row.impulse[2]);
+    else
+        std::ranges::fill(row.impulse, 0.0f);
+}
+
+void RigidContacts::finish(std::span<BodyState> bodies, double dt, double slow, const RunContext& context) {
+    if (rows_.empty()) return;
+    const auto is_touching = [&](const ContactRow& row) { // now; what only came nearer is left alone
+        if (row.impulse[0] > 0) return true;
+        const bool is_of_sleeper = row.movers[0] == 0 || (row.movers[1] == 0 && points_[row.point].other != kNoIndex);
+        if (is_of_sleeper) return false;
+        const float along = row.speeds(changes_[row.movers[0]], changes_[row.movers[1]])[0];
+        const float spacing = float(bodies[points_[row.point].body].body->spacing());
+        return row.separation + float(dt) * along < kTouches * spacing;
+    };
+    for (ContactRow& row : rows_)
+        row.target = row.approach < -float(slow) ? -points_[row.point].restitution * row.approach : 0;
+    parallel_for(context, islands_.size() - 1, kIslandsGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            const std::span rows = std::span(swept_).subspan(islands_[k], islands_[k + 1] - islands_[k]);
+            std::size_t pushing = 0;
+            for (Index r = islands_[k]; r < islands_[k + 1]; ++r)
+                if (is_touching(rows_[r])) rows[pushing++] = r;
+            sweep_until_still(rows.first(pushing), kMostRowsSwept / 2, float(kStill * (10 * dt)));
+        }
+    });
+    for (const ContactRow& row : rows_) {
         // Of what comes apart the next substep begins anew: the blow's force would throw it.
-        const bool parts = relative_velocity(row).dot(row.normal) > 0.5 * slow;
-        *points_[k].holds = row.impulse > 0;
-        points_[k].impulse = float(row.impulse);
-        points_[k].approach = float(-row.approach);
-        const Vec3d impulse = row.impulse * row.normal + row.tangent_impulses[0] * row.tangents[0] +
-                              row.tangent_impulses[1] * row.tangents[1];
-        *points_[k].force = parts ? Vec3f(Vec3f::Zero()) : Vec3f((impulse / dt).cast<float>());
+        const float along = row.speeds(changes_[row.movers[0]], changes_[row.movers[1]])[0];
+        ContactPoint& point = points_[row.point];
+        point.impulse = row.impulse[0];
+        point.approach = -row.approach;
+        if (point.holds) *point.holds = row.impulse[0] > 0;
+        Vec3f impulse = Vec3f::Zero();
+        for (int k = 0; k < 3 && !(along > 0.5f * float(slow)); ++k)
+            impulse += row.impulse[k] * vector_of(row.direction[k]);
+        *point.force = impulse / float(dt);
     }
     write_back(bodies);
 }

@@ -19,6 +19,9 @@ public:
             beside_soft_[a] |= !is_rigid(b);
             beside_soft_[b] |= !is_rigid(a);
         });
+        state.rigid_pairs.each_holding([&](Index a, Index b) {
+            if (!state.bodies[a].is_absent && !state.bodies[b].is_absent) groups_.join(a, b);
+        });
         state.contacts.each_on_obstacle([&](Index b) {
             if (is_rigid(b)) on_obstacle_[groups_.root(b)] = 1;
         });

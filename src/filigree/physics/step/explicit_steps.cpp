@@ -42,6 +42,7 @@ constexpr float kFreeWay = 0.05f;      ///< spacings a substep: ... as far as th
 constexpr double kMostDeforming = 0.5; ///< spacings a substep, between particles of one body
 constexpr double kStifferDamped = 2;   ///< times the squared frequency at rest: what is stiffer is damped for less time
 constexpr double kUsualSubsteps = 256; ///< a frame: what the first forces of a frame take for the step before
+constexpr double kSlowHit = 0.02, kSlowHitSubsteps = 2; ///< m/s, and of gravity: what comes slower does not bounce
 
 /// m/s: velocities less the body's rigid motion.
 Vectors deforming_velocities(const BodyState& body, const RunContext& context) {
@@ -151,7 +152,9 @@ public:
     ExplicitSteps(SimulationState& state, double from, double until, FrameReport& report, const RunContext& context)
         : state_(state), bodies_(state.bodies), report_(report), context_(context), now_(from), until_(until),
           calmed_(from), meets_anything_(!state.world.obstacles.empty() || state.options.contacts_within_bodies ||
-                                         (state.options.contacts_between_bodies && state.bodies.size() > 1)) {}
+                                         (state.options.contacts_between_bodies && state.bodies.size() > 1)),
+          has_soft_(std::ranges::any_of(state.bodies, [](const BodyState& b) { return !b.is_absent && !b.rigid; })),
+          rigid_contacts_(state.rigid_contacts) {}
 
     double run() {
         if (meets_anything_) state_.contacts.begin_frame(bodies_, context_);
@@ -236,17 +239,17 @@ private:
     void move_rigid(double dt) {
         wake_met(dt);
         const Vec3d& gravity = state_.world.gravity;
-        rigid_contacts_.prepare(bodies_);
+        rigid_contacts_.prepare(bodies_, gravity, context_);
         each_awake_rigid([&](BodyState& body, std::size_t b) {
             kick_rigid(body, {}, gravity, dt, 1);
             kick_rigid(body, rigid_loads_[b], Vec3d::Zero(), 0.5 * dt, std::exp(-dt * body.body->material.damping));
         });
-        rigid_contacts_.solve(bodies_, dt);
+        rigid_contacts_.solve(bodies_, dt, context_);
         each_awake_rigid([&](BodyState& body, std::size_t b) {
             drift_rigid(body, dt);
             if (!rigid_contacts_.pushes(b)) body.rigid->centre -= 0.5 * dt * dt * gravity;
         });
-        rigid_contacts_.finish(bodies_, dt, double(contact_law::smooth_speed(state_.world, float(dt))));
+        rigid_contacts_.finish(bodies_, dt, kSlowHit + kSlowHitSubsteps * dt * gravity.norm(), context_);
         state_.contacts.events().push(rigid_contacts_.points());
         place_rigid();
     }
@@ -275,15 +278,26 @@ private:
         state_.contacts.search(bodies_, {.time = now_, .frame = frame, .step = step}, context_);
     }
 
+    /// Whether penalties may push a rigid body, which its squared frequency stands for.
+    bool is_pushed_by_penalty(std::size_t b) const { return has_soft_ || state_.contacts.is_near_traced(b); }
+
     /// All forces at the present positions, and the step that is stable there.
     void find_forces(float dt, bool is_again = false) {
         find_elastic_forces(dt, is_again);
+        if (meets_anything_) {
+            const Stopwatch watch(report_.contact_seconds);
+            const double longest = std::min(state_.frame_seconds() / kLeastSubsteps, double(kLongestRigidStep));
+            if (state_.rigid_pairs.search(bodies_, longest, context_)) state_.contacts.list_work(bodies_);
+        }
         {
             const Stopwatch watch(report_.contact_seconds);
             const ContactReport touching = state_.contacts.add_forces(bodies_, now_, dt, rigid_contacts_, context_);
             report_.contacts = touching.contacts;
             report_.deepest_contact = std::max(report_.deepest_contact, double(touching.deepest));
-            report_.deepest_in_matter = std::max(report_.deepest_in_matter, double(touching.deepest_in_matter));
+            const RigidPairs::Report rigid = state_.rigid_pairs.add_points(bodies_, rigid_contacts_, context_);
+            report_.contacts += rigid.contacts;
+            report_.deepest_in_matter =
+                std::max({report_.deepest_in_matter, double(touching.deepest_in_matter), double(rigid.deepest)});
         }
         const Stopwatch watch(report_.other_seconds);
         state_.external.add_forces(bodies_, now_, context_);
@@ -293,7 +307,7 @@ private:
             BodyState& body = bodies_[b];
             if (body.sleeps()) continue;
             double& squared_frequency = frequencies[b];
-            squared_frequency = double(elastic_[b].squared_frequency);
+            squared_frequency = body.rigid && !is_pushed_by_penalty(b) ? 0 : double(elastic_[b].squared_frequency);
             if (!body.rigid)
                 squared_frequency += state_.contacts.added_frequency(b) * double(body.rest_squared_frequency);
             squared_frequency = state_.external.add_pulls(body, b, now_, squared_frequency);
@@ -307,7 +321,10 @@ private:
         }
         rigid_loads_.resize(bodies_.size());
         each_awake([&](const BodyState& body, std::size_t b) {
-            if (body.rigid) rigid_loads_[b] = rigid_load(body);
+            if (!body.rigid) return;
+            const bool is_loaded =
+                is_pushed_by_penalty(b) || state_.external.has_wind() || state_.external.acts_on(b, now_);
+            rigid_loads_[b] = is_loaded || !state_.cracks.empty() ? rigid_load(body) : RigidLoad{};
         });
         is_finite_ = true;
         stable_of_bodies_ = kNoLimit;
@@ -322,6 +339,8 @@ private:
             shortest_body_ = b;
         }
         stable_step_ = std::min(stable_step_, stable_of_bodies_);
+        if (std::ranges::any_of(bodies_, [](const BodyState& body) { return body.rigid && !body.sleeps(); }))
+            stable_step_ = std::min({stable_step_, state_.rigid_pairs.longest_step(), double(kLongestRigidStep)});
         stable_step_ = std::min(stable_step_, stable_in_frame_);
         stable_step_ = std::min(stable_step_, std::max(opening_step, kShortestOpening * stable_step_));
     }
@@ -404,6 +423,7 @@ private:
             if (debts_[b].has_begun()) debts_[b].end(body, context_);
         });
         each_awake_rigid([&](BodyState& body, std::size_t b) {
+            if (rigid_loads_[b].force.isZero(0) && rigid_loads_[b].torque.isZero(0)) return;
             kick_rigid(body, rigid_loads_[b], Vec3d::Zero(), 0.5 * double(dt), 1);
             place_particles(body);
         });
@@ -483,6 +503,7 @@ private:
     double now_, until_;        // s
     double calmed_;             ///< s: until when what rubs has been calmed
     const bool meets_anything_; // obstacles, other bodies or parts of the same
+    const bool has_soft_;       ///< bodies that are not rigid
     std::vector<ElasticReport> elastic_;
     struct Vibration {           ///< of a body
         bool has_forces = false; ///< of this frame; those before it are not known after a restore
@@ -494,7 +515,7 @@ private:
     std::vector<Vibration> vibrations_;
     std::vector<EnergyDebt> debts_;      ///< of each body, in this frame
     std::vector<RigidLoad> rigid_loads_; ///< of each body, by find_forces
-    RigidContacts rigid_contacts_;       ///< the same
+    RigidContacts& rigid_contacts_;      ///< the same
     double stable_step_ = 0;             // s
     double stable_of_bodies_ = kNoLimit; ///< s, by what the bodies are themselves ...
     std::size_t shortest_body_ = 0;      ///< ... and the one that asks for it

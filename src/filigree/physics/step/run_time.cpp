@@ -59,7 +59,9 @@ void wake_if_asleep(SimulationState& state, std::size_t slot) {
 
 /// What lies on a body has nothing to lie on any more.
 void wake_beside(SimulationState& state, std::size_t slot) {
-    state.contacts.each_beside(slot, [&](std::size_t other) { wake_if_asleep(state, other); });
+    const auto wake_other = [&](std::size_t other) { wake_if_asleep(state, other); };
+    state.contacts.each_beside(slot, wake_other);
+    state.rigid_pairs.each_beside(slot, wake_other);
 }
 
 void end_attachments(SimulationState& state, std::size_t slot) {
@@ -94,6 +96,7 @@ void end_holds(SimulationState& state, std::size_t actor) {
 void free_one(SimulationState& state, std::size_t slot) {
     wake_beside(state, slot);
     state.contacts.remove_body(state.bodies, slot);
+    state.rigid_pairs.remove_body(state.bodies, slot);
     state.external.remove_body(slot);
     state.bodies[slot] = free_slot();
 }

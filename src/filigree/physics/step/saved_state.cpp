@@ -18,6 +18,8 @@ static_assert(sizeof(ContactEvents::PairMemory) == 2 * sizeof(std::uint64_t) + 2
 static_assert(sizeof(Contacts::CandidateMemory) == 4 * sizeof(Index) + 4 * sizeof(Vec3f) + sizeof(Vec3d),
               "padding would be saved");
 static_assert(sizeof(Contacts::PairMemory) == 8 * sizeof(Index), "padding would be saved");
+static_assert(sizeof(RigidPairs::Point) == 3 * sizeof(Index) + 4 * sizeof(Vec3f), "padding would be saved");
+static_assert(sizeof(RigidPairs::PairMemory) == 16 * sizeof(Index), "padding would be saved");
 static_assert(sizeof(LinkState) == 2 * sizeof(float) + sizeof(Vec3f), "padding would be saved");
 
 void write_pose(ByteWriter& writer, const std::optional<RigidPose>& pose) {
@@ -118,6 +120,8 @@ std::string write_saved_state(const SavedState& state) {
     writer.value(std::uint64_t(state.bodies.size()));
     for (const SavedBody& body : state.bodies) write_body(writer, body);
     write_contacts(writer, state.contacts);
+    writer.array(std::span(state.rigid_pairs.pairs));
+    writer.array(std::span(state.rigid_pairs.points));
     writer.array(std::span(state.grid));
     for (const CrackMemory& cracks : state.cracks) {
         writer.value(cracks.is_open);
@@ -148,6 +152,8 @@ Result<SavedState> read_saved_state(std::string_view bytes) {
     state.bodies.resize(reader.count(sizeof(std::uint64_t)));
     for (SavedBody& body : state.bodies) body = read_body(reader);
     state.contacts = read_contacts(reader);
+    state.rigid_pairs.pairs = reader.array<RigidPairs::PairMemory>();
+    state.rigid_pairs.points = reader.array<RigidPairs::Point>();
     const std::vector<char> grid = reader.array<char>();
     state.grid.assign(grid.begin(), grid.end());
     while (reader.ok() && !reader.at_end()) {

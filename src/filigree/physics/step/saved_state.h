@@ -4,6 +4,7 @@
 #include "filigree/core/result.h"
 #include "filigree/physics/breaking/cracks.h"
 #include "filigree/physics/contact/contact.h"
+#include "filigree/physics/rigid/rigid_pairs.h"
 #include "filigree/physics/step/made_for.h"
 #include "filigree/physics/step/set_motion.h"
 
@@ -26,6 +27,7 @@ struct SavedState {
     std::vector<SetMotion> set_motions; ///< of obstacles that were set
     std::vector<SavedBody> bodies;
     Contacts::Memory contacts;
+    RigidPairs::Memory rigid_pairs;
     std::string grid;                ///< mpm::Bodies::state
     std::vector<CrackMemory> cracks; ///< of bodies that break
 };

@@ -64,6 +64,7 @@ SavedState save_state(const SimulationState& state) {
     saved.set_motions = state.set_motions;
     for (const BodyState& body : state.bodies) saved.bodies.push_back(save_body(body));
     saved.contacts = state.contacts.memory();
+    saved.rigid_pairs = state.rigid_pairs.memory();
     saved.grid = state.grid->state();
     for (const Cracks& cracks : state.cracks) saved.cracks.push_back(cracks.memory());
     return saved;
@@ -104,6 +105,7 @@ Status restore_state(SimulationState& state, SavedState saved) {
         if (body.is_on_grid) state.grid->read(body.actor, body.positions, body.velocities);
     for (const Cracks& cracks : state.cracks) cracks.show_whole(state.bodies);
     if (!state.contacts.set_memory(saved.contacts, state.bodies)) return damaged;
+    if (!state.rigid_pairs.set_memory(saved.rigid_pairs, state.bodies)) return damaged;
     state.frame = saved.frame;
     return Success{};
 }

@@ -5,6 +5,7 @@
 #include "filigree/physics/breaking/piece_followers.h"
 #include "filigree/physics/contact/contact.h"
 #include "filigree/physics/grid/mpm.h"
+#include "filigree/physics/rigid/rigid_pairs.h"
 #include "filigree/physics/simulation.h"
 #include "filigree/physics/step/external_forces.h"
 #include "filigree/physics/step/made_for.h"
@@ -20,7 +21,7 @@ struct SimulationState {
     SimulationState(World the_world, std::size_t body_count, std::size_t actor_count, const StepOptions& the_options)
         : world(std::move(the_world)), options(the_options), made_for(filigree::made_for(world, the_options)),
           contacts(world, actor_count, the_options.contacts_between_bodies, the_options.contacts_within_bodies),
-          external(world, body_count) {
+          rigid_pairs(world, actor_count, the_options.contacts_between_bodies), external(world, body_count) {
         for (const Obstacle& obstacle : world.obstacles) made_motions.push_back(obstacle.motion);
     }
     SimulationState(const SimulationState&) = delete; // contacts and external refer to the world
@@ -44,6 +45,8 @@ struct SimulationState {
     std::vector<StartOverlap> start_overlaps;
     std::vector<Cracks> cracks; ///< of bodies that break
     Contacts contacts;
+    RigidPairs rigid_pairs;
+    RigidContacts rigid_contacts; ///< room that is used again; nothing is remembered
     ExternalForces external;
     std::unique_ptr<mpm::Bodies> grid;      ///< of bodies of mpm; never null
     std::vector<Attachment> attachments;    ///< of slots; of bodies that were removed kNobody

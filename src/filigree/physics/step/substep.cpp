@@ -165,6 +165,7 @@ Breaks break_bodies(SimulationState& state, double before, double now, const Run
     }
     if (!breaks.contacts) return breaks;
     state.contacts.begin_anew();
+    state.rigid_pairs.begin_anew();
     state.external.find_wind(state.bodies, now, state.options.frames_per_second, context);
     return breaks;
 }
