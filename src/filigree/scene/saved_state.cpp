@@ -12,7 +12,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTAT10"; // ends in the version
+constexpr std::string_view kFormat = "FILSTAT", kMagic = "FILSTATA"; // ends in the version: 9, A
 
 void write_totals(ByteWriter& out, const RunTotals& t) {
     for (const std::uint64_t count :
