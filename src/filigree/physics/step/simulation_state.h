@@ -78,6 +78,7 @@ void step_on_grid(SimulationState& state, double from, double until, FrameReport
 /// What a body's elasticity met, into the frame's report.
 void note_deformation(FrameReport& report, std::size_t body, const ElasticReport& met);
 
+float least_spacing(std::span<const BodyState> bodies); ///< m
 /// Puts pinned particles where their motion has them at `now`, with its velocity; dt: of the substep, 0 at the start.
 /// Of bodies on the grid, or of the others.
 void move_pins(SimulationState& state, double now, float dt, bool on_grid = false);

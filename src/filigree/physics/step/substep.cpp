@@ -77,6 +77,12 @@ const Cracks* SimulationState::cracks_of(std::size_t slot) const {
     return found == cracks.end() ? nullptr : &*found;
 }
 
+float least_spacing(std::span<const BodyState> bodies) {
+    float spacing = std::numeric_limits<float>::max();
+    for (const BodyState& body : bodies) spacing = std::min(spacing, float(body.body->spacing()));
+    return spacing;
+}
+
 void move_pins(SimulationState& state, double now, float dt, bool on_grid) {
     for (std::size_t p = 0; p < state.world.pins.size(); ++p) {
         const Pin& pin = state.world.pins[p];
