@@ -251,7 +251,7 @@ void Contacts::find_own(ContactPair& pair, const BodyState& body, float frame, c
 
 /// Those that touch stay; their friction goes on.
 void Contacts::merge_in_matter(Merge& merge, const ContactPair& pair, const BodyState& body, Index point,
-                               const CellBoxes::Near& found) {
+                               const CellBoxes::Near& found) const {
     const Candidate* old = merge.old(point);
     if (old && (old->grasp.holds || old->is_tangled))
         merge.add(*old, merge.still_clear());

@@ -132,9 +132,11 @@ void Contacts::with_sides(const ContactPair& pair, std::span<BodyState> bodies, 
         visit(BodyPoints(bodies[points]), matter());
 }
 
-/// m outside, at which a point of a rigid pair counts as touching.
-float Contacts::margin_of(const ContactPair& pair) {
-    return pair.is_rigid ? touching_margin(pair.spacing, pair.speed) : 0;
+/// m outside, at which a point of a rigid pair counts as touching: however fast the body goes, something may turn it
+/// towards the obstacle within the substep.
+float Contacts::margin_of(const ContactPair& pair) const {
+    const ColliderId body = pair.points.is_obstacle() ? pair.touched : pair.points;
+    return pair.is_rigid ? touching_margin(pair.spacing, motions_.speed(body.number())) : 0;
 }
 
 /// The force on a point; minus it is that on what it touches. Lets friction's anchor begin, slide and end. Of a rigid

@@ -177,7 +177,7 @@ private:
     template <class Visit>
     void with_sides(const ContactPair& pair, std::span<BodyState> bodies, const ObstaclePoses& poses,
                     const Visit& visit) const;
-    static float margin_of(const ContactPair& pair);
+    float margin_of(const ContactPair& pair) const;
     template <class Points, class Touched>
     Vec3f touch(ContactPair& pair, std::size_t k, const Points& points, const Touched& touched, float dt) const;
     template <class Points, class Touched>
@@ -211,8 +211,8 @@ private:
                          const ObstaclePoses& poses, const RunContext& context);
     bool begin_pair(ContactPair& pair, const Surroundings& around, const Ahead& ahead,
                     const ObstaclePoses& poses) const;
-    static void merge_in_matter(Merge& merge, const ContactPair& pair, const BodyState& body, Index point,
-                                const CellBoxes::Near& found);
+    void merge_in_matter(Merge& merge, const ContactPair& pair, const BodyState& body, Index point,
+                         const CellBoxes::Near& found) const;
     void find_own(ContactPair& pair, const BodyState& body, float frame, const RunContext& context) const;
     void find_in_matter(ContactPair& pair, const Surroundings& around, const RunContext& context) const;
     void find_at_edges(ContactPair& pair, const Surroundings& around, const ObstaclePoses& poses) const;

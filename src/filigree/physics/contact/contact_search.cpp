@@ -15,6 +15,7 @@ namespace {
 constexpr std::size_t kExtentsGrain = 8, kClocksGrain = 512; // bodies, pairs
 /// Of what another pair may still move until it is searched; they share what a search finds out about bodies.
 constexpr float kSearchedAlong = 0.5f;
+constexpr float kFurthest = 1e15f;       ///< m that anything goes in a substep
 constexpr float kCrushed = 0.05f;        ///< volume ratio below which a cell counts as crushed
 constexpr float kTooManyCrushed = 0.05f; ///< part of a body's cells
 constexpr Index kAskedCells = 7;         ///< one of so many is asked
@@ -222,7 +223,8 @@ void Contacts::search(std::span<BodyState> bodies, const Search& search, const R
                              std::ranges::any_of(bodies, [](const BodyState& body) { return body.rigid.has_value(); });
     const float next = looks_ahead ? ahead.in_step_of_all(relative_speed_of_all(bodies)) : 0;
     bool changed = travelled_ + next > reach_;
-    if (changed) find_pairs(bodies, 2 * next, ahead, poses, context);
+    if (changed)
+        find_pairs(bodies, next < kFurthest ? 2 * next : 0, ahead, poses, context); // else the frame is done again
     const bool woke = wake_touched(bodies);
     const auto is_due = [&](const ContactPair& pair, float moved, float part) {
         if (!(moved > part * (pair.reach - ahead.in_step(pair))) || sleeps(pair, bodies)) return false;

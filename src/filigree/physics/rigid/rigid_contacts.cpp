@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <utility>
 
@@ -17,18 +18,16 @@ namespace {
 
 constexpr double kCorrected = 0.2;       ///< part of a penetration that a substep takes away ...
 constexpr double kFastestCorrection = 3; ///< m/s: ... no faster than this
-constexpr double kDeep = 0.5;            ///< spacings; deeper there is no such limit
+constexpr float kDeep = 0.5f;            ///< spacings, in an obstacle: what is deeper is moved out at once
 constexpr double kSlop = 2e-3;           ///< spacings of penetration that are left, so that what rests keeps touching
 constexpr std::size_t kFewestSweeps = 3, kMostSweeps = 400, kMostRowsSwept = 8000;
 constexpr std::size_t kIslandsGrain = 8, kRowsGrain = 128;
 constexpr float kTouches = 0.005f; ///< spacings outside: what has come so near bounces as what pushes does
 constexpr double kStill = 1e-4;    ///< of what gravity adds in a substep: a smaller change of velocity ends the sweeps
 
-/// m/s that take a part of a penetration away in dt. What came deep into an obstacle, faster than a substep can see, is
-/// out soon.
-double correction(double depth, double spacing, bool in_obstacle, double dt) {
-    const double wanted = kCorrected * std::max(0.0, depth - kSlop * spacing) / dt;
-    return in_obstacle && depth > kDeep * spacing ? wanted : std::min(kFastestCorrection, wanted);
+/// m/s that take a part of a penetration away in dt.
+double correction(double depth, double spacing, double dt) {
+    return std::min(kFastestCorrection, kCorrected * std::max(0.0, depth - kSlop * spacing) / dt);
 }
 
 ContactRow::Four four_of(const Vec3f& v) {
@@ -172,6 +171,31 @@ void RigidContacts::take_velocities(std::span<const BodyState> bodies) {
     }
 }
 
+std::vector<std::pair<Index, float>> RigidContacts::move_out_of_obstacles(std::span<BodyState> bodies) {
+    std::map<Index, Vec3f> ways; // of bodies, m
+    for (const ContactPoint& point : points_) {
+        if (point.other != kNoIndex) continue;
+        const float too_deep = -point.separation - kDeep * float(bodies[point.body].body->spacing());
+        if (!(too_deep > 0)) continue;
+        Vec3f& way = ways.try_emplace(point.body, Vec3f::Zero()).first->second;
+        if (too_deep > way.norm()) way = too_deep * point.normal;
+    }
+    std::vector<std::pair<Index, float>> moved;
+    for (const auto& [body, way] : ways) {
+        bodies[body].rigid->centre += way.cast<double>();
+        place_particles(bodies[body]);
+        moved.emplace_back(body, way.norm());
+    }
+    for (ContactPoint& point : points_) {
+        if (const auto of = ways.find(point.body); of != ways.end()) {
+            point.place += of->second;
+            point.separation += of->second.dot(point.normal);
+        }
+        if (const auto of = ways.find(point.other); of != ways.end()) point.separation -= of->second.dot(point.normal);
+    }
+    return moved;
+}
+
 void RigidContacts::prepare(std::span<const BodyState> bodies, const Vec3d& gravity, const RunContext& context) {
     reduce_on_obstacles(bodies);
     movers_.assign(1, {});
@@ -252,9 +276,9 @@ void RigidContacts::start_row(ContactRow& row, std::span<const BodyState> bodies
         row.start[k] = before.dot(vector_of(row.direction[k]));
         row.impulse[k] = impulse.dot(vector_of(row.direction[k]));
     }
-    row.target = float(point.separation > 0 ? -double(point.separation) / dt
-                                            : correction(-double(point.separation), bodies[point.body].body->spacing(),
-                                                         point.other == kNoIndex, dt));
+    row.target =
+        float(point.separation > 0 ? -double(point.separation) / dt
+                                   : correction(-double(point.separation), bodies[point.body].body->spacing(), dt));
     if (row.impulse[0] > 0)
         row.push(changes_[row.movers[0]], changes_[row.movers[1]], row.impulse[0], row.impulse[1], row.impulse[2]);
     else

@@ -39,6 +39,9 @@ public:
 
     std::span<const ContactPoint> points() const { return points_; }
 
+    /// What is deep in an obstacle came in faster than a substep can see, began there, or the obstacle jumped: it is
+    /// moved out at once and gets no speed, and its points go along. Returns which bodies, and how far, m.
+    std::vector<std::pair<Index, float>> move_out_of_obstacles(std::span<BodyState> bodies);
     /// Before loads change velocities: what restitution goes by. Of the points that a body has on obstacles a manifold
     /// is left. gravity: m/s^2, what comes becomes faster until it touches.
     void prepare(std::span<const BodyState> bodies, const Vec3d& gravity, const RunContext& context);

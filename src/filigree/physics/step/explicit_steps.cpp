@@ -295,6 +295,8 @@ private:
             report_.contacts = touching.contacts;
             report_.deepest_contact = std::max(report_.deepest_contact, double(touching.deepest));
             const RigidPairs::Report rigid = state_.rigid_pairs.add_points(bodies_, rigid_contacts_, context_);
+            for (const auto& [body, way] : rigid_contacts_.move_out_of_obstacles(bodies_))
+                state_.contacts.was_moved(body, way);
             report_.contacts += rigid.contacts;
             report_.deepest_in_matter =
                 std::max({report_.deepest_in_matter, double(touching.deepest_in_matter), double(rigid.deepest)});
