@@ -241,8 +241,8 @@ private:
         const Vec3d& gravity = state_.world.gravity;
         rigid_contacts_.prepare(bodies_, gravity, context_);
         each_awake_rigid([&](BodyState& body, std::size_t b) {
-            kick_rigid(body, {}, gravity, dt, 1);
             kick_rigid(body, rigid_loads_[b], Vec3d::Zero(), 0.5 * dt, std::exp(-dt * body.body->material.damping));
+            kick_rigid(body, {}, gravity, dt, 1); // undamped: what lies has its whole weight
         });
         rigid_contacts_.solve(bodies_, dt, context_);
         each_awake_rigid([&](BodyState& body, std::size_t b) {
@@ -404,7 +404,8 @@ private:
             elastic_[b] = body.elasticity->forces(positions, body.forces, context_);
         }
         if (debts_[b].has_begun()) debts_[b].moved(body, body.forces);
-        const bool is_crushed = elastic_[b].least_volume_ratio < InternalDamping::kDampedBelow;
+        const float ratio = elastic_[b].least_volume_ratio; // what is inside out has to move to come back
+        const bool is_crushed = ratio > 0 && ratio < InternalDamping::kDampedBelow;
         vibrations_[b].elastic = is_crushed ? body.forces : Vectors();
     }
 
