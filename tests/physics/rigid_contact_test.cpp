@@ -170,6 +170,33 @@ TEST(RigidContact, AHeavyCubeStandsOnALightOne) {
     }
 }
 
+TEST(RigidContact, WhatRocksComesToRestOnEveryKindOfObstacleAlike) {
+    const Mesh plate = make_box({-1, -0.2f, -1}, {2, 0.2f, 2});
+    World plane, box, mesh;
+    plane.obstacles.emplace_back().shape = HalfSpace{};
+    box.obstacles.emplace_back().shape = Cuboid{{0, -0.1, 0}, {2, 0.2, 2}};
+    mesh.obstacles.emplace_back().shape = make_mesh_obstacle(plate, 1, 0.05, kContext).value();
+    const auto ball = body_of(make_wavy_sphere({.resolution = 4, .amplitude = 0, .size = 0.2}), 300);
+    const auto cube = body_of(make_wavy_cube({.resolution = 8, .size = 0.3}), 100);
+    for (const auto& body : {ball, cube}) {
+        std::vector<Vec3d> ends;
+        for (const World& world : {plane, box, mesh}) {
+            Actor falls = actor(body, {0.02, 0.5, 0});
+            falls.placement.rotate(Eigen::AngleAxisd(0.1, Vec3d::UnitX()));
+            falls.may_sleep = false;
+            Simulation scene = simulation(world, {falls});
+            run(scene, 420);
+            const double before = scene.energy(kContext).total();
+            run(scene, 60);
+            EXPECT_LT(scene.energy(kContext).kinetic, 1e-6 * mass_of(*body));
+            EXPECT_NEAR(scene.energy(kContext).total(), before, 1e-4 * mass_of(*body));
+            ends.push_back(centre_of_mass(scene, 0));
+            EXPECT_GT(ends.back().y(), 0.05);
+        }
+        EXPECT_LT((ends[2] - ends[1]).norm(), 0.02) << "a box, and a mesh of the same box";
+    }
+}
+
 TEST(RigidContact, FrictionHoldsBelowItsAngleAndSlidesAboveIt) {
     const auto cube = box(4, 4, 4, 0.05, stone());
     for (const double degrees : {20.0, 25.0, 28.0, 40.0}) { // the limit is 26.57

@@ -52,6 +52,16 @@ Vec3d inside_of(const BodyState& body, Index point) {
     return sum / double(surface.offsets[point + 1] - surface.offsets[point]);
 }
 
+/// Where a point that comes near an obstacle stood free at last: where it is, or in the matter beside it. A wall stands
+/// between both where the point went through, but also where that matter, which may lie outside of the body, is behind
+/// the wall: the body's middle tells. clear: m around the place without a wall.
+Vec3d free_place(const ObstacleShape& shape, const Vec3d& place, double clear, const Vec3d& inside,
+                 const Vec3d& middle) {
+    if ((place - inside).norm() < clear) return place;
+    const bool is_behind = shape.is_between(inside, place) && shape.is_between(middle, place);
+    return is_behind ? inside : place;
+}
+
 constexpr double kMostEdgeParts = 4096; // of an edge
 
 Index parts_of(const ObstacleShape::Edge& edge, double spacing) {
@@ -337,7 +347,7 @@ void Contacts::find_traced(ContactPair& pair, const Surroundings& around, const 
     const ObstacleShape& shape = shapes_[pair.touched.number()];
     const Eigen::Isometry3d to_own = poses.at(pair.touched.number()).inverse();
     const std::span<const Vec3f> points = around.points(pair.points.number());
-    const float reach = pair.reach;
+    const float margin = margin_of(pair), reach = pair.reach + margin;
     const bool is_new = !std::exchange(pair.knows_side, true);
     std::optional<StartSides> sides;
     if (is_new) sides.emplace(body, shape, poses.at(pair.touched.number()));
@@ -345,8 +355,9 @@ void Contacts::find_traced(ContactPair& pair, const Surroundings& around, const 
     if (is_new) pair.clear();
     const Box& box = around.extent(pair.points.number());
     const double all = 0.5 * box.diagonal() + double(reach);
+    const Vec3d centre = to_own * box.centre();
     Merge merge(pair);
-    if (!is_across && !merge.had_any() && shape.clearance(to_own * box.centre(), all) >= all) return;
+    if (!is_across && !merge.had_any() && shape.clearance(centre, all) >= all) return;
     std::vector<float> distances(points.size());
     parallel_for(context, points.size(), kSearchGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t s = begin; s < end; ++s)
@@ -362,16 +373,17 @@ void Contacts::find_traced(ContactPair& pair, const Surroundings& around, const 
             if (!is_asked && !(distance < reach)) continue;
             Candidate next = *old;
             if (!is_asked) next.local_point = place;
-            merge.add(next, is_asked ? 0 : distance);
+            merge.add(next, is_asked ? 0 : distance - margin);
         } else if (is_across || distance < reach) {
-            const Vec3d from = sides ? sides->start_of(s) : to_own * inside_of(body, s);
+            const Vec3d from = sides ? sides->start_of(s)
+                                     : free_place(shape, place, double(distance), to_own * inside_of(body, s), centre);
             Candidate next{.point = s, .place = {}, .grasp = {}, .anchor = {}, .local_point = from};
             if ((place - from).norm() < double(distance))
                 next.local_point = place;
             else if (const WallTouch touch = shape.follow(next.local_point, place); touch.depth > 0)
                 next.entry_normal = touch.normal.cast<float>();
             const bool is_asked = !next.entry_normal.isZero(0);
-            if (is_asked || distance < reach) merge.add(next, is_asked ? 0 : distance);
+            if (is_asked || distance < reach) merge.add(next, is_asked ? 0 : distance - margin);
         }
     }
 }

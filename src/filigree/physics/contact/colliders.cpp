@@ -83,15 +83,19 @@ Meeting ObstacleCollider::meet(Candidate& at, const ContactPair& pair, const Vec
     double clear = touched ? 0 : shape_.clearance(place, reach);
     if ((place - at.local_point).norm() < clear) {
         at.local_point = place;
-        return {.depth = -float(clear)};
+    } else {
+        const WallTouch touch = shape_.follow(at.local_point, place);
+        if (touch.depth > 0) {
+            at.entry_normal = touch.normal.cast<float>();
+            return {(motion.linear() * touch.normal).cast<float>(), float(touch.depth)};
+        }
+        if (touched) clear = shape_.clearance(place, reach);
     }
-    const WallTouch touch = shape_.follow(at.local_point, place);
-    if (touch.depth > 0) {
-        at.entry_normal = touch.normal.cast<float>();
-        return {(motion.linear() * touch.normal).cast<float>(), float(touch.depth)};
-    }
-    if (touched) clear = shape_.clearance(place, reach);
-    return {.depth = -float(clear)};
+    at.entry_normal = Vec3f::Zero();
+    if (const double margin = double(approach.margin); clear < margin)
+        if (const auto wall = shape_.closest(place, margin))
+            return {(motion.linear() * wall->second).cast<float>(), -float(wall->first)};
+    return {.depth = approach.margin - float(clear)};
 }
 
 Meeting MatterCollider::meet(Candidate& at, const ContactPair& pair, const Vec3f& point,

@@ -70,6 +70,16 @@ double ObstacleShape::gap(const Box& box, const Eigen::Isometry3d& motion) const
     return ((centre - half) - box.max).cwiseMax(box.min - (centre + half)).cwiseMax(0).norm();
 }
 
+std::optional<std::pair<double, Vec3d>> ObstacleShape::closest(const Vec3d& point, double reach) const {
+    const ClosestWall wall = ball_ ? ClosestWall{} : surface_->closest(point - offset_, reach);
+    if (!ball_ && wall.triangle == kNoIndex) return std::nullopt;
+    const Vec3d away = ball_ ? Vec3d(point - ball_->centre) : Vec3d(point - offset_ - wall.position);
+    const double length = away.norm(), distance = ball_ ? std::abs(length - ball_->radius) : length;
+    if (!(distance <= reach) || !(length > 0)) return std::nullopt;
+    const double side = ball_ && length < ball_->radius ? -1 : 1;
+    return std::pair(distance, Vec3d(side / length * away));
+}
+
 bool ObstacleShape::is_between(const Vec3d& from, const Vec3d& to) const {
     if (!ball_) return surface_->first_crossing(from - offset_, to - offset_).has_value();
     return ((from - ball_->centre).norm() < ball_->radius) != ((to - ball_->centre).norm() < ball_->radius);

@@ -16,6 +16,8 @@ public:
     /// As ObstacleSurface::follow, and clearance.
     WallTouch follow(Vec3d& place, const Vec3d& target) const;
     double clearance(const Vec3d& point, double reach) const;
+    /// The wall that is the closest to a point, no further than `reach`: m, and unit from it to the point; or none.
+    std::optional<std::pair<double, Vec3d>> closest(const Vec3d& point, double reach) const;
     /// Whether a way meets the obstacle.
     bool is_between(const Vec3d& from, const Vec3d& to) const;
     /// Whether a point lies inside of what is solid: a ball, a cuboid, or a closed mesh.

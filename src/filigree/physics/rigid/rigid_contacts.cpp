@@ -22,7 +22,8 @@ constexpr float kDeep = 0.5f;            ///< spacings, in an obstacle: what is 
 constexpr double kSlop = 2e-3;           ///< spacings of penetration that are left, so that what rests keeps touching
 constexpr std::size_t kFewestSweeps = 3, kMostSweeps = 400, kMostRowsSwept = 8000;
 constexpr std::size_t kIslandsGrain = 8, kRowsGrain = 128;
-constexpr float kTouches = 0.005f; ///< spacings outside: what has come so near bounces as what pushes does
+/// Spacings outside, and of the way in the substep: what has come so near bounces as what pushes does.
+constexpr float kTouches = 0.005f, kTouchesOfWay = 0.05f;
 constexpr double kStill = 1e-4;    ///< of what gravity adds in a substep: a smaller change of velocity ends the sweeps
 
 /// m/s that take a part of a penetration away in dt.
@@ -293,7 +294,8 @@ void RigidContacts::finish(std::span<BodyState> bodies, double dt, double slow, 
         if (is_of_sleeper) return false;
         const float along = row.speeds(changes_[row.movers[0]], changes_[row.movers[1]])[0];
         const float spacing = float(bodies[points_[row.point].body].body->spacing());
-        return row.separation + float(dt) * along < kTouches * spacing;
+        const float came = float(dt) * std::max(-row.approach, float(slow)); // what bounces in the air gains energy
+        return row.separation + float(dt) * along < std::min(kTouches * spacing, kTouchesOfWay * came);
     };
     for (ContactRow& row : rows_)
         row.target = row.approach < -float(slow) ? -points_[row.point].restitution * row.approach : 0;

@@ -279,7 +279,7 @@ private:
     }
 
     /// Whether penalties may push a rigid body, which its squared frequency stands for.
-    bool is_pushed_by_penalty(std::size_t b) const { return has_soft_ || state_.contacts.is_near_traced(b); }
+    bool is_pushed_by_penalty(std::size_t) const { return has_soft_; }
 
     /// All forces at the present positions, and the step that is stable there.
     void find_forces(float dt, bool is_again = false) {
