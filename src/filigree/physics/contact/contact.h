@@ -83,14 +83,6 @@ public:
     void was_placed(std::size_t body);
     /// The next search finds everything again; what touches is remembered.
     void begin_anew();
-    /// Whether a body is near an obstacle beside which points are followed, or whose edges push.
-    bool is_near_traced(std::size_t body) const {
-        const ColliderId id = ColliderId::body(body);
-        return std::ranges::any_of(pairs_, [&](const ContactPair& pair) {
-            const bool is_near = pair.points == id ? pair.is_traced : pair.touched == id && pair.points.is_obstacle();
-            return is_near && !pair.candidates.empty();
-        });
-    }
     /// s: in longer steps something could pass through something.
     double longest_step() const;
     float speed(std::size_t body) const { return motions_.speed(body); } ///< m/s, bound: of the last travel

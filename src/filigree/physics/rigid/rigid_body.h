@@ -5,7 +5,7 @@
 
 namespace filigree {
 
-/// Squared frequency that contacts with soft bodies and obstacles' edges give a rigid body at most, 1/s^2: 16 substeps
+/// Squared frequency that contacts with soft bodies give a rigid body at most, 1/s^2: 16 substeps
 /// a frame at 60 frames a second.
 inline constexpr float kRigidSquaredFrequency = 0.99e6f;
 inline constexpr float kLongestRigidStep = 4.2e-3f; ///< s, of substeps of rigid bodies: 4 a frame, else

@@ -278,9 +278,6 @@ private:
         state_.contacts.search(bodies_, {.time = now_, .frame = frame, .step = step}, context_);
     }
 
-    /// Whether penalties may push a rigid body, which its squared frequency stands for.
-    bool is_pushed_by_penalty(std::size_t) const { return has_soft_; }
-
     /// All forces at the present positions, and the step that is stable there.
     void find_forces(float dt, bool is_again = false) {
         find_elastic_forces(dt, is_again);
@@ -309,7 +306,8 @@ private:
             BodyState& body = bodies_[b];
             if (body.sleeps()) continue;
             double& squared_frequency = frequencies[b];
-            squared_frequency = body.rigid && !is_pushed_by_penalty(b) ? 0 : double(elastic_[b].squared_frequency);
+            // A rigid body's stands for the penalties of soft ones.
+            squared_frequency = body.rigid && !has_soft_ ? 0 : double(elastic_[b].squared_frequency);
             if (!body.rigid)
                 squared_frequency += state_.contacts.added_frequency(b) * double(body.rest_squared_frequency);
             squared_frequency = state_.external.add_pulls(body, b, now_, squared_frequency);
@@ -324,8 +322,7 @@ private:
         rigid_loads_.resize(bodies_.size());
         each_awake([&](const BodyState& body, std::size_t b) {
             if (!body.rigid) return;
-            const bool is_loaded =
-                is_pushed_by_penalty(b) || state_.external.has_wind() || state_.external.acts_on(b, now_);
+            const bool is_loaded = has_soft_ || state_.external.has_wind() || state_.external.acts_on(b, now_);
             rigid_loads_[b] = is_loaded || !state_.cracks.empty() ? rigid_load(body) : RigidLoad{};
         });
         is_finite_ = true;
