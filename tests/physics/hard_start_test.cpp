@@ -141,8 +141,7 @@ TEST(HardStarts, ACrushedCellDoesNotShortenStepsByItsDamping) {
     Material jelly = material(MaterialModel::fem, 1e7);
     const auto substeps = [&](double seconds, bool is_crushed) {
         jelly.internal_damping = seconds;
-        Simulation one = simulation(free_space(), {actor(box(6, 6, 6, 0.1, jelly))},
-                                    {.automatic_rigid = false});
+        Simulation one = simulation(free_space(), {actor(box(6, 6, 6, 0.1, jelly))}, {.automatic_rigid = false});
         Vectors positions = one.positions(0);
         for (std::size_t i = 0; i < positions.size() && is_crushed; ++i) // all corners at x = 0
             if (positions.x[i] < 0.05f) positions.x[i] = 0.09f;

@@ -49,9 +49,9 @@ struct BodyState {
     bool is_stiff = false; ///< its bounces are over before they are seen, and are what restitution says (stiff_hits.h)
     BodyHit hit;           ///< of a stiff body
     float rubbed_seconds = 0; ///< at whose frames' starts it rubbed, since it touched nothing (vibration.h)
-    float step_seconds = 0;           ///< of the substep that is being made
-    float most_push = 0;              ///< m that contact may push a particle out in it: kMostPush
-    float pushed_way = 0; ///< m that particles were moved one by one, at most; a rigid body's pose has to follow
+    float step_seconds = 0;   ///< of the substep that is being made
+    float most_push = 0;      ///< m that contact may push a particle out in it: kMostPush
+    float pushed_way = 0;     ///< m that particles were moved one by one, at most; a rigid body's pose has to follow
     bool is_free() const { return actor == kNobody; } ///< no body is here: it was removed
     bool sleeps() const { return is_absent || (rigid && rigid->sleeps); }
 

@@ -11,7 +11,7 @@ namespace filigree {
 
 namespace {
 
-constexpr std::size_t kSearchGrain = 512, kBodiesSearchGrain = 8, kPairsGrain = 8;
+constexpr std::size_t kSearchGrain = 512, kBodiesSearchGrain = 8, kPairSearchGrain = 8;
 constexpr float kOwnReach = 0.3f;  ///< spacings that a body's parts may go beside each other between two searches
 constexpr float kFoldReach = 0.1f; ///< spacings that points may go until the next search for folds
 constexpr float kOutsideOfCells = 0.25f, kOutsideOfRigid = 0.5f; ///< spacings outside of cells where points may touch
@@ -210,7 +210,7 @@ void Contacts::find_candidates(std::span<const Index> due, std::span<const BodyS
         if (has_points[b]) around.find_points(b, context);
         if (has_cells[b]) around.find_cells(b);
     });
-    parallel_for(context, near.size(), kPairsGrain, [&](std::size_t begin, std::size_t end) {
+    parallel_for(context, near.size(), kPairSearchGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             ContactPair& pair = pairs_[near[k]];
             if (pair.points.is_obstacle())

@@ -24,7 +24,7 @@ constexpr std::size_t kFewestSweeps = 3, kMostSweeps = 400, kMostRowsSwept = 800
 constexpr std::size_t kIslandsGrain = 8, kRowsGrain = 128;
 /// Spacings outside, and of the way in the substep: what has come so near bounces as what pushes does.
 constexpr float kTouches = 0.005f, kTouchesOfWay = 0.05f;
-constexpr double kStill = 1e-4;    ///< of what gravity adds in a substep: a smaller change of velocity ends the sweeps
+constexpr double kStill = 1e-4; ///< of what gravity adds in a substep: a smaller change of velocity ends the sweeps
 
 /// m/s that take a part of a penetration away in dt.
 double correction(double depth, double spacing, double dt) {
