@@ -10,6 +10,7 @@
 #include <cmath>
 #include <gtest/gtest.h>
 #include <numbers>
+#include <ostream>
 #include <string>
 
 namespace filigree::contact_law_test {
@@ -56,6 +57,7 @@ struct OnSlope {
     double turned, heading; ///< degrees about the normal: of the body, and of the way down
     Vec3d size = Vec3d::Constant(0.1);
 };
+void PrintTo(const OnSlope& row, std::ostream* out) { *out << row.material; } // else its bytes, padding too
 
 /// A box on flat ground, and gravity that leans.
 Simulation on_slope(const OnSlope& row, double degrees, double damping) {
