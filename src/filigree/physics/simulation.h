@@ -47,7 +47,7 @@ struct FrameReport {
     double deepest_contact = 0;     ///< m below an obstacle's surface
     double deepest_in_matter = 0;   ///< m that a point of a surface lay inside another body, or its own
     float least_volume_ratio = 1;   ///< smallest J of all cells; 0 or less: inverted
-    std::size_t most_crushed = 0;   ///< the body that has it; below 0.1 explicit steps damp it a little
+    std::size_t most_crushed = 0;   ///< the body that has it; below 0.3 such cells are damped
     float most_stretch = 1;
     /// Cells and particles of plastic fem and meshfree that have flowed to seven times their length, and are elastic
     /// from there on: what flows further is mpm's.

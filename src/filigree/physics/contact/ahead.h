@@ -27,21 +27,18 @@ struct Contacts::Ahead {
             obstacle_step.push_back(moves ? way(search.step) : 0);
         }
     }
-    static std::size_t obstacle_of(const ContactPair& pair) {
-        return pair.touched.is_obstacle() ? pair.touched.number() : pair.points.number();
-    }
     /// m that a pair may go in the next substep. What points are followed beside has to be found before; half-spaces
     /// stop also what is found below them.
     float in_step(const ContactPair& pair) const {
         return pair.is_traced || pair.is_rigid
-                   ? kFaster * ((pair.speed + gained) * step + obstacle_step[obstacle_of(pair)])
+                   ? kFaster * ((pair.speed + gained) * step + obstacle_step[pair.obstacle()])
                    : 0;
     }
     /// m that a pair may go until it is searched again.
     float reach(const ContactPair& pair) const {
         if (pair.is_of_bodies()) return std::clamp(pair.speed * frame, kLeastReach * pair.spacing, most(pair));
-        const float way = (pair.speed + gained) * frame + obstacle_frame[obstacle_of(pair)];
-        if (pair.points.is_obstacle()) return std::clamp(way, kLeastReach * pair.spacing, most(pair));
+        const float way = (pair.speed + gained) * frame + obstacle_frame[pair.obstacle()];
+        if (pair.is_of_edges()) return std::clamp(way, kLeastReach * pair.spacing, most(pair));
         const float wanted = std::clamp(2 * way, kLeastToObstacle * pair.spacing, kMostToObstacle * pair.spacing);
         return std::max(wanted, 2 * in_step(pair));
     }

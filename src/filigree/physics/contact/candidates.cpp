@@ -12,9 +12,9 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kSearchGrain = 512, kBodiesSearchGrain = 8, kPairSearchGrain = 8;
-constexpr float kOwnReach = 0.3f;  ///< spacings that a body's parts may go beside each other between two searches
-constexpr float kFoldReach = 0.1f; ///< spacings that points may go until the next search for folds
-constexpr float kOutsideOfCells = 0.25f, kOutsideOfRigid = 0.5f; ///< spacings outside of cells where points may touch
+constexpr float kOwnReach = 0.3f;       ///< spacings that a body's parts may go beside each other between two searches
+constexpr float kFoldReach = 0.1f;      ///< spacings that points may go until the next search for folds
+constexpr float kOutsideOfRigid = 0.5f; ///< spacings outside of a rigid body's cells where points may touch
 
 /// Where corners will be in so many seconds.
 Vectors positions_in(const BodyState& body, float seconds) {
@@ -114,16 +114,14 @@ public:
     const CellBoxes& cells(Index body) const { return *cells_[body]; }        ///< after find_cells
     /// m: how far outside of a body's cells points may touch it.
     float outside(Index body) const {
-        return (is_rigid(body) ? kOutsideOfRigid : kOutsideOfCells) * float(bodies_[body].body->spacing());
+        return (is_rigid(body) ? kOutsideOfRigid : MatterCollider::kOutside) * float(bodies_[body].body->spacing());
     }
     /// m, after find_extent of both: points of a body are no nearer to another. Looks no closer where that is `enough`.
     double gap(Index body, Index other, double enough) const {
         const Box &a = extent(body), &b = extent(other);
         const double gap = (a.min - b.max).cwiseMax(b.min - a.max).cwiseMax(0).norm();
         if (gap > enough || !is_rigid(other)) return gap;
-        if (!is_rigid(body)) return std::max(gap, double(cells(other).gap_of_rigid(turned_box(a))));
-        return std::max({gap, double(cells(other).gap_of_rigid(cells(body).rigid_box())),
-                         double(cells(body).gap_of_rigid(cells(other).rigid_box()))});
+        return std::max(gap, double(cells(other).gap_of_rigid(turned_box(a))));
     }
 
 private:
@@ -213,7 +211,7 @@ void Contacts::find_candidates(std::span<const Index> due, std::span<const BodyS
     parallel_for(context, near.size(), kPairSearchGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             ContactPair& pair = pairs_[near[k]];
-            if (pair.points.is_obstacle())
+            if (pair.is_of_edges())
                 find_at_edges(pair, around, poses);
             else if (!pair.touched.is_obstacle())
                 find_in_matter(pair, around, context);
@@ -235,10 +233,9 @@ bool Contacts::begin_pair(ContactPair& pair, const Surroundings& around, const A
         const float outside = around.outside(other);
         gap = float(around.gap(body, other, double(pair.reach + outside))) - outside;
     } else {
-        const Index body = (pair.points.is_obstacle() ? pair.touched : pair.points).number();
-        const std::size_t obstacle = Ahead::obstacle_of(pair);
+        const Index body = pair.body(), obstacle = pair.obstacle();
         gap = float(shapes_[obstacle].gap(around.extent(body), poses.at(obstacle)));
-        gap -= pair.points.is_obstacle() ? around.outside(body) : margin_of(pair);
+        gap -= pair.is_of_edges() ? around.outside(body) : margin_of(pair);
     }
     if (!(gap > pair.reach)) return true;
     pair.clear();
@@ -261,13 +258,12 @@ void Contacts::find_own(ContactPair& pair, const BodyState& body, float frame, c
 
 /// Those that touch stay; their friction goes on.
 void Contacts::merge_in_matter(Merge& merge, const ContactPair& pair, const BodyState& body, Index point,
-                               const CellBoxes::Near& found) const {
+                               const CellBoxes::Near& found) {
     const Candidate* old = merge.old(point);
     if (old && (old->grasp.holds || old->is_tangled))
         merge.add(*old, merge.still_clear());
     else if (found.cell != kNoIndex && !body.is_hidden(point))
-        merge.add({.point = point, .place = {found.cell}, .grasp = {}, .anchor = {}},
-                  pair.safe_way(found.gap - margin_of(pair)));
+        merge.add({.point = point, .place = {found.cell}, .grasp = {}, .anchor = {}}, pair.safe_way(found.gap));
 }
 
 void Contacts::find_in_matter(ContactPair& pair, const Surroundings& around, const RunContext& context) const {

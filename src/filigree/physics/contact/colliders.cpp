@@ -13,7 +13,6 @@ constexpr float kSlowest = 0.2f, kSlowestBeside = 0.02f; ///< less of points bes
 constexpr float kLittle = 0.05f;                         ///< spacings until a point that is nowhere is asked again ...
 constexpr float kLittleBeside = 0.2f;                    ///< ... and the same of those, by their own speed
 constexpr float kClearerOfRigid = 0.8f;                  ///< part of a distance from a rigid body that is safe to go
-constexpr float kOutside = 0.25f;      ///< cells that a point may lie outside of the last one and still touch
 constexpr float kLeap = 0.25f;         ///< spacings; after a longer one the closest surface may be another one
 constexpr float kShareOfPoints = 0.5f; ///< of the stiffness that a particle's surface points may have
 
@@ -125,8 +124,7 @@ Meeting MatterCollider::meet(Candidate& at, const ContactPair& pair, const Vec3f
     return {found->normal, depth};
 }
 
-/// Of two rigid bodies, or of a rigid body and an edge: where the point lies in it, or may lie before the next substep
-/// ends.
+/// Of an edge and a rigid body: where the point lies in it, or may lie before the next substep ends.
 Meeting MatterCollider::meet_rigid(Candidate& at, const ContactPair& pair, const Vec3f& point,
                                    const Approach& approach) const {
     Mat3f inverse;

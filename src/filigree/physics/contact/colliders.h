@@ -113,6 +113,8 @@ private:
 /// folded onto it.
 class MatterCollider {
 public:
+    static constexpr float kOutside = 0.25f; ///< cells that a point may lie outside of the last one and still touch
+
     MatterCollider(BodyState& body, const BodyMatter& of, bool recovers)
         : body_(body), matter_(*of.matter), per_area_(of.per_area), recovers_(recovers) {}
     /// Finds where a point lies in the matter.

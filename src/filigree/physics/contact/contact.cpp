@@ -5,6 +5,7 @@
 #include "filigree/core/parallel_for.h"
 
 #include <algorithm>
+#include <map>
 
 namespace filigree {
 
@@ -110,11 +111,10 @@ ContactPair Contacts::make_pair(ColliderId points, ColliderId touched, std::span
         if (pair.is_own()) pair.stiffness *= kWithinOneBody;
         return pair;
     }
-    const Index number = points.is_obstacle() ? points.number() : touched.number();
-    const Obstacle& obstacle = world_.obstacles[number];
+    const Obstacle& obstacle = world_.obstacles[pair.obstacle()];
     pair.law = {obstacle.friction, obstacle.restitution};
     pair.stiffness = float(obstacle.stiffness);
-    pair.is_traced = touched.is_obstacle() && shapes_[number].is_traced();
+    pair.is_traced = touched.is_obstacle() && shapes_[pair.obstacle()].is_traced();
     if (points.is_obstacle()) pair.slack = kEdgeSlack * pair.spacing;
     return pair;
 }
@@ -135,8 +135,7 @@ void Contacts::with_sides(const ContactPair& pair, std::span<BodyState> bodies, 
 /// m outside, at which a point of a rigid pair counts as touching: however fast the body goes, something may turn it
 /// towards the obstacle within the substep.
 float Contacts::margin_of(const ContactPair& pair) const {
-    const ColliderId body = pair.points.is_obstacle() ? pair.touched : pair.points;
-    return pair.is_rigid ? touching_margin(pair.spacing, motions_.speed(body.number())) : 0;
+    return pair.is_rigid ? touching_margin(pair.spacing, motions_.speed(pair.body())) : 0;
 }
 
 /// The force on a point; minus it is that on what it touches. Lets friction's anchor begin, slide and end. Of a rigid
@@ -145,8 +144,8 @@ template <class Points, class Touched>
 Vec3f Contacts::touch(ContactPair& pair, std::size_t k, const Points& points, const Touched& touched, float dt) const {
     Candidate& at = pair.candidates[k];
     const Vec3f point = points.position(at);
-    const bool is_edge = pair.points.is_obstacle();
-    const Approach approach{margin_of(pair), is_edge ? Vec3f(dt * points.velocity(at)) : Vec3f(Vec3f::Zero()), dt};
+    const Approach approach{margin_of(pair),
+                            pair.is_of_edges() ? Vec3f(dt * points.velocity(at)) : Vec3f(Vec3f::Zero()), dt};
     const Meeting met = touched.meet(at, pair, point, approach);
     at.depth = at.is_tangled ? 0 : met.depth;
     if (met.normal.isZero(0)) {
@@ -190,17 +189,13 @@ ContactPoint Contacts::contact_point(ContactPair& pair, Candidate& at, const Vec
                        .restitution = float(pair.law.restitution),
                        .force = &at.rigid_force,
                        .holds = &at.grasp.holds};
-    const bool is_edge = pair.points.is_obstacle();
-    point.body = is_edge ? pair.touched.number() : pair.points.number();
-    point.normal = is_edge ? Vec3f(-normal) : normal;
+    point.body = pair.body();
+    point.obstacle = pair.obstacle();
+    point.normal = pair.is_of_edges() ? Vec3f(-normal) : normal;
     with_sides(pair, bodies, poses, [&](const auto& points, const auto& touched) {
         point.place = points.position(at);
-        if (is_edge)
-            point.other_velocity = points.velocity(at);
-        else if (pair.touched.is_obstacle())
-            point.other_velocity = touched.velocity(at, point.place);
+        point.other_velocity = pair.is_of_edges() ? points.velocity(at) : touched.velocity(at, point.place);
     });
-    point.obstacle = is_edge ? pair.points.number() : pair.touched.number();
     return point;
 }
 
@@ -208,10 +203,9 @@ ContactPoint Contacts::contact_point(ContactPair& pair, Candidate& at, const Vec
 void Contacts::tell(const ContactPair& pair, const Vec3f& place, const Vec3f& normal, float impulse, float approach,
                     bool is_push) {
     if (pair.is_own()) return;
-    const bool is_edge = pair.points.is_obstacle();
-    const Index body = is_edge ? pair.touched.number() : pair.points.number();
-    const ColliderId other = is_edge ? pair.points : pair.touched;
-    const Vec3f towards = is_edge ? Vec3f(-normal) : normal;
+    const Index body = pair.body();
+    const ColliderId other = pair.is_of_edges() ? pair.points : pair.touched;
+    const Vec3f towards = pair.is_of_edges() ? Vec3f(-normal) : normal;
     if (is_push)
         events_.push(body, other, place, towards, impulse, approach);
     else
@@ -228,9 +222,7 @@ void Contacts::note_touch(const ContactPair& pair, const Candidate& at, ContactR
         report.deepest_in_matter = std::max(report.deepest_in_matter, at.depth);
         return;
     }
-    const bool is_edge = pair.points.is_obstacle();
-    const Index body = is_edge ? pair.touched.number() : pair.points.number();
-    touched_[body] |= std::uint8_t((is_edge ? kInMatter : kOnObstacle) | rubs);
+    touched_[pair.body()] |= std::uint8_t((pair.is_of_edges() ? kInMatter : kOnObstacle) | rubs);
     report.deepest = std::max(report.deepest, at.depth);
 }
 

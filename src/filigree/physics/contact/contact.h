@@ -12,7 +12,6 @@
 #include "filigree/physics/rigid/rigid_contacts.h"
 
 #include <algorithm>
-#include <map>
 #include <memory>
 
 namespace filigree {
@@ -203,8 +202,8 @@ private:
                          const ObstaclePoses& poses, const RunContext& context);
     bool begin_pair(ContactPair& pair, const Surroundings& around, const Ahead& ahead,
                     const ObstaclePoses& poses) const;
-    void merge_in_matter(Merge& merge, const ContactPair& pair, const BodyState& body, Index point,
-                         const CellBoxes::Near& found) const;
+    static void merge_in_matter(Merge& merge, const ContactPair& pair, const BodyState& body, Index point,
+                                const CellBoxes::Near& found);
     void find_own(ContactPair& pair, const BodyState& body, float frame, const RunContext& context) const;
     void find_in_matter(ContactPair& pair, const Surroundings& around, const RunContext& context) const;
     void find_at_edges(ContactPair& pair, const Surroundings& around, const ObstaclePoses& poses) const;

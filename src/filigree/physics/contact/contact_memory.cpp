@@ -46,12 +46,13 @@ bool Contacts::is_sound(const Memory& memory, std::span<const BodyState> bodies)
         if (pair.candidates > memory.candidates.size() - from) return false;
         const std::size_t points = pair.points.is_obstacle() ? kNoIndex : bodies[pair.points.number()].surface.size();
         const std::size_t cells = is_of_matter ? bodies[pair.touched.number()].body->cells.cells.size() : 0;
-        const bool is_rigid = is_of_matter && !pair.points.is_obstacle() && bodies[pair.points.number()].rigid &&
-                              bodies[pair.touched.number()].rigid;
+        const auto is_rigid = [&](ColliderId id) { return id.is_obstacle() || bodies[id.number()].rigid; };
+        const bool is_solved = is_rigid(pair.points) && is_rigid(pair.touched);    // by impulses
+        if (is_solved && is_of_matter && !pair.points.is_obstacle()) return false; // two rigid bodies are RigidPairs'
         for (Index k = 0; k < pair.candidates; ++k, ++from) {
             const CandidateMemory& at = memory.candidates[from];
             if (at.point >= points || (is_of_matter && at.cell >= cells)) return false;
-            const bool is_anchored = is_of_matter && (at.flags & 1) && !is_rigid;
+            const bool is_anchored = is_of_matter && (at.flags & 1) && !is_solved;
             if (is_anchored && at.anchor_cell >= cells) return false;
             if (!at.local.allFinite() || !at.anchor_local.allFinite() || !at.entry_normal.allFinite() ||
                 !at.rigid_force.allFinite() || !at.local_point.allFinite())

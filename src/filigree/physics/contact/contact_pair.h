@@ -65,6 +65,10 @@ struct ContactPair {
 
     bool is_own() const { return points == touched; }
     bool is_of_bodies() const { return !points.is_obstacle() && !touched.is_obstacle(); }
+    bool is_of_edges() const { return points.is_obstacle(); }
+    /// Of a pair of a body and an obstacle: their numbers.
+    Index body() const { return is_of_edges() ? touched.number() : points.number(); }
+    Index obstacle() const { return is_of_edges() ? points.number() : touched.number(); }
     std::size_t blocks() const { return (candidates.size() + kBlock - 1) / kBlock; }
     void pad() { clear_until.resize(blocks() * kBlock, 0); }
     void clear() {

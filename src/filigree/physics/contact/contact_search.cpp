@@ -101,7 +101,7 @@ void Contacts::travel(std::span<BodyState> bodies, float dt, double from, double
     parallel_for(context, pairs_.size(), kClocksGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             ContactPair& pair = pairs_[k];
-            const float of_obstacle = pair.is_of_bodies() ? 0 : ways[Ahead::obstacle_of(pair)];
+            const float of_obstacle = pair.is_of_bodies() ? 0 : ways[pair.obstacle()];
             pair.speed = speed_of(pair);
             pair.travelled += dt * pair.speed + of_obstacle;
             pair.displacement += of_obstacle;
@@ -148,7 +148,7 @@ void Contacts::forget_jumps(double time) {
         if (!jumps_between(world_.obstacles[o].motion, *time_, time)) continue;
         reach_ = -1;
         for (ContactPair& pair : pairs_) {
-            if (pair.is_of_bodies() || Ahead::obstacle_of(pair) != o) continue;
+            if (pair.is_of_bodies() || pair.obstacle() != o) continue;
             pair.knows_side = false;
             pair.reach = -1;
         }

@@ -15,7 +15,6 @@ public:
         const auto is_rigid = [&](std::size_t b) { return state.bodies[b].rigid.has_value(); };
         state.contacts.each_holding([&](Index a, Index b) {
             if (state.bodies[a].is_absent || state.bodies[b].is_absent) return;
-            if (is_rigid(a) && is_rigid(b)) groups_.join(a, b);
             beside_soft_[a] |= !is_rigid(b);
             beside_soft_[b] |= !is_rigid(a);
         });
