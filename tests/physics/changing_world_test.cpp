@@ -385,6 +385,22 @@ TEST(SetObstacle, AJumpIsNoBlow) {
     }
 }
 
+/// By less than a cell, by whole cells, and by more than half of the body.
+TEST(SetObstacle, AJumpIntoABodyMovesItAndThrowsNothing) {
+    for (const MaterialModel model : {MaterialModel::rigid, MaterialModel::fem, MaterialModel::springs})
+        for (const double deep : {0.05, 0.1, 0.15}) {
+            World world = free_space();
+            world.obstacles.push_back({.shape = Cuboid{{-5, 0, 0}, {0.4, 2, 2}}, .motion = {}});
+            Simulation scene = simulation(world, {actor(box(4, 4, 4, 0.1, material(model, 1e6)))});
+            run(scene, 2);
+            const double before = centre_of_mass(scene).x();
+            ASSERT_TRUE(scene.set_obstacle(0, pose({4.8 + deep, 0, 0})).ok());
+            run(scene, 30);
+            EXPECT_NEAR(centre_of_mass(scene).x(), before + deep, 0.01) << int(model) << ' ' << deep;
+            EXPECT_LT(scene.energy(RunContext(1)).total(), 1e-3) << int(model) << ' ' << deep;
+        }
+}
+
 TEST(SetObstacle, WakesWhatItTouches) {
     World world = with_table();
     world.obstacles.push_back({.shape = Ball{{-1, 0.1, 0}, 0.1}, .motion = {}});

@@ -198,6 +198,7 @@ void set_obstacle(SimulationState& state, const SetMotion& set, bool is_jump) {
         }
     }
     state.contacts.set_obstacle(number, is_jump);
+    if (is_jump) make_way(state, number, state.time());
 }
 
 } // namespace filigree

@@ -89,6 +89,8 @@ bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic
 /// Where a half-space, a ball or a cuboid jumps into an elastic body between two times, the body is moved out of it as
 /// a whole, and gets no speed by it. Bodies with pins are left to push_out.
 void make_way(SimulationState& state, double before, double now);
+/// The same of one obstacle that stands elsewhere now.
+void make_way(SimulationState& state, std::size_t obstacle, double now);
 /// Moves out what contacts find too deep.
 void push_out(SimulationState& state, double now, const RunContext& context);
 /// Plastic flow.

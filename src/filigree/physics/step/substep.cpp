@@ -121,25 +121,26 @@ bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic
     return repaired;
 }
 
-void make_way(SimulationState& state, double before, double now) {
+void make_way(SimulationState& state, std::size_t obstacle, double now) {
     constexpr int kPasses = 3; // round the corners of a cuboid
-    const World& world = state.world;
-    for (std::size_t o = 0; o < world.obstacles.size(); ++o) {
-        if (!jumps_between(world.obstacles[o].motion, before, now)) continue;
-        if (std::holds_alternative<MeshObstacle>(world.obstacles[o].shape)) continue;
-        const ObstaclePoses poses(world, now);
-        for (std::size_t b = 0; b < state.bodies.size(); ++b) {
-            BodyState& body = state.bodies[b];
-            if (body.is_absent || body.rigid || state.is_piece(b)) continue; // they have to move alike
-            if (std::ranges::any_of(body.fixed, [](std::uint8_t fixed) { return fixed != 0; })) continue;
-            for (int pass = 0; pass < kPasses; ++pass) {
-                const Vec3f out = way_out(body, o, poses);
-                if (out.isZero(0)) break;
-                for (std::size_t i = 0; i < body.positions.size(); ++i) body.positions.add(i, out);
-                state.contacts.was_moved(b, out.norm());
-            }
+    if (std::holds_alternative<MeshObstacle>(state.world.obstacles[obstacle].shape)) return;
+    const ObstaclePoses poses(state.world, now);
+    for (std::size_t b = 0; b < state.bodies.size(); ++b) {
+        BodyState& body = state.bodies[b];
+        if (body.is_absent || body.rigid || state.is_piece(b)) continue; // they have to move alike
+        if (std::ranges::any_of(body.fixed, [](std::uint8_t fixed) { return fixed != 0; })) continue;
+        for (int pass = 0; pass < kPasses; ++pass) {
+            const Vec3f out = way_out(body, obstacle, poses);
+            if (out.isZero(0)) break;
+            for (std::size_t i = 0; i < body.positions.size(); ++i) body.positions.add(i, out);
+            state.contacts.was_moved(b, out.norm());
         }
     }
+}
+
+void make_way(SimulationState& state, double before, double now) {
+    for (std::size_t o = 0; o < state.world.obstacles.size(); ++o)
+        if (jumps_between(state.world.obstacles[o].motion, before, now)) make_way(state, o, now);
 }
 
 void push_out(SimulationState& state, double now, const RunContext& context) {
