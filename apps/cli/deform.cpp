@@ -96,13 +96,13 @@ void check_poses_fit(std::size_t frames, std::size_t driver_vertices, const std:
 }
 
 /// The model itself, with the poses.
-void write_posed_model(const Model& model, const PoseStream& poses, const std::string& output, Session& session,
+void write_posed_model(const Model& model, const FrameSource<Pose>& poses, const std::string& output, Session& session,
                        Report& report) {
     check_poses_fit(poses.frames, model.driver().vertices.size(), output);
     PoseSequence sequence{poses.frames_per_second, {}};
     for (std::size_t frame = 0; frame < poses.frames; ++frame) {
         session.context().report("deforming", double(frame) / double(poses.frames));
-        sequence.frames.push_back(require(poses.pose(frame)));
+        sequence.frames.push_back(require(poses.frame(frame)));
     }
     session.context().report("deforming", 1);
     session.write_model(model, output, sequence);
@@ -113,9 +113,9 @@ void write_posed_model(const Model& model, const PoseStream& poses, const std::s
 void animate_model(const Model& model, const DeformArguments& options, Session& session, Report& report) {
     const Deformation deformation(options);
     const RunContext silent = session.silent_context(); // the bar tells of frames
-    const PoseStream poses{options.frames, options.frames_per_second, [&](std::size_t frame) -> Result<Pose> {
-                               return deformation.driver(model, options.fraction(frame), silent);
-                           }};
+    const FrameSource<Pose> poses{options.frames, options.frames_per_second, [&](std::size_t frame) -> Result<Pose> {
+                                      return deformation.driver(model, options.fraction(frame), silent);
+                                  }};
     if (is_model_path(options.output)) return write_posed_model(model, poses, options.output, session, report);
     write_animation_output(model, poses, options.restore, options.animation, options.output, options.input, session,
                            report);

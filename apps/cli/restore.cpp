@@ -246,7 +246,7 @@ struct AnimatedModel {
     PoseSequence own;
     std::optional<ModelChunks> in_file;
     std::optional<Model> in_memory;
-    PoseStream poses;
+    FrameSource<Pose> poses;
 
     const Model& driver() const { return in_file ? in_file->driver() : *in_memory; } ///< has the driver, or more
 };
@@ -298,7 +298,7 @@ void restore_all(const RestoreArguments& options, Session& session) {
     if (!options.chunk.empty()) return restore_chunk(options, session);
     AnimatedModel model;
     read_animated(options, session, model);
-    const char* from = source_of(model.driver(), require(model.poses.pose(0)));
+    const char* from = source_of(model.driver(), require(model.poses.frame(0)));
     Report report;
     const double start = now_seconds();
     if (model.in_file)

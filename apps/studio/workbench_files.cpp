@@ -167,11 +167,12 @@ Result<QString> write_frames(const State& state, const Recording& poses, const N
     if (!restorer) return restorer.error();
     RunContext quiet = context; // the progress is that of the frames
     quiet.progress = nullptr;
-    const NumberedMeshes meshes{name, [&](std::size_t frame) -> Result<Mesh> {
-                                    if (const auto surface = poses.surface(frame)) return *surface;
-                                    return restorer->mesh(*poses.frames[frame], quiet);
-                                }};
-    const auto warnings = write_numbered_meshes(poses.frames.size(), std::span(&meshes, 1), context);
+    const auto mesh = [&](std::size_t frame) -> Result<Mesh> {
+        if (const auto surface = poses.surface(frame)) return *surface;
+        return restorer->mesh(*poses.frames[frame], quiet);
+    };
+    const NumberedMeshes meshes{name, {poses.frames.size(), poses.frames_per_second, mesh}};
+    const auto warnings = write_numbered_meshes(std::span(&meshes, 1), context);
     if (!warnings) return warnings.error();
     QString text = QString("Saved %1 to %2.")
                        .arg(counted(poses.frames.size(), "mesh", "meshes"), file_name(name.file(1).string()));

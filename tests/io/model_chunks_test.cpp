@@ -92,7 +92,7 @@ TEST_F(ModelChunksTest, RestoreTheSameBytesAsTheWhole) {
             for (const RestoreOptions& options :
                  {RestoreOptions{}, RestoreOptions{.law = HeightLaw::keep, .thin_shell = true}}) {
                 const auto written =
-                    write_restored_chunks(*chunks, stream_of(poses), options, path("chunks.pc2"), kTwoThreads);
+                    write_restored_chunks(*chunks, frames_of(poses), options, path("chunks.pc2"), kTwoThreads);
                 ASSERT_TRUE(written.ok()) << written.error().message;
                 EXPECT_TRUE(written->empty());
                 EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses, options));
@@ -115,7 +115,7 @@ TEST_F(ModelChunksTest, HaveNoVerticesOfADriverMadeElsewhere) {
             EXPECT_EQ(chunks->vertex_count(), mesh.vertex_count());
             const ModelOutline outline = *read_model_outline(*FileReader::open(path("m.fil")), "m.fil", kTwoThreads);
             EXPECT_EQ(outline.levels.back().vertices, mesh.vertex_count());
-            ASSERT_TRUE(write_restored_chunks(*chunks, stream_of(poses), {}, path("chunks.pc2"), kTwoThreads).ok());
+            ASSERT_TRUE(write_restored_chunks(*chunks, frames_of(poses), {}, path("chunks.pc2"), kTwoThreads).ok());
             EXPECT_EQ(fs::file_size(path("chunks.pc2")), 32 + 3 * 12 * mesh.vertex_count());
             EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses));
         }
@@ -126,7 +126,7 @@ TEST_F(ModelChunksTest, AreSharedByProcesses) {
     const PoseSequence poses = bent_poses(model, false);
     const Result<ModelChunks> chunks = open(model);
     for (std::size_t part = 1; part <= 2; ++part) {
-        const auto report = write_restored_chunks(*chunks, stream_of(poses), {}, path("shared.pc2"),
+        const auto report = write_restored_chunks(*chunks, frames_of(poses), {}, path("shared.pc2"),
                                                   WorkChunk{part, 2, "job"}, kTwoThreads);
         ASSERT_TRUE(report.ok()) << report.error().message;
         EXPECT_EQ(report->is_whole, part == 2);
@@ -137,7 +137,7 @@ TEST_F(ModelChunksTest, AreSharedByProcesses) {
 TEST_F(ModelChunksTest, FarFromTheOriginLostDigitsAreSaid) {
     const Model model = model_of(Precision::float32, {1e6, 0, 0});
     const PoseSequence poses = bent_poses(model, false);
-    const auto written = write_restored_chunks(*open(model), stream_of(poses), {}, path("chunks.pc2"), kTwoThreads);
+    const auto written = write_restored_chunks(*open(model), frames_of(poses), {}, path("chunks.pc2"), kTwoThreads);
     ASSERT_TRUE(written.ok());
     EXPECT_EQ(written->size(), 1u);
     EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses));
@@ -157,7 +157,7 @@ TEST_F(ModelChunksTest, DamageIsSeenWhereItIsRead) {
     ASSERT_TRUE(chunks.ok());
     EXPECT_TRUE(chunks->restorer(0, RunContext()).ok());
     EXPECT_EQ(chunks->restorer(1, RunContext()).error().code, ErrorCode::bad_file);
-    const auto written = write_restored_chunks(*chunks, stream_of(poses), {}, path("c.pc2"), kTwoThreads);
+    const auto written = write_restored_chunks(*chunks, frames_of(poses), {}, path("c.pc2"), kTwoThreads);
     EXPECT_EQ(written.error().code, ErrorCode::bad_file);
     EXPECT_NE(written.error().message.find("mesh.pos"), std::string::npos) << written.error().message;
     EXPECT_FALSE(fs::exists(path("c.pc2")));
@@ -173,7 +173,7 @@ TEST_F(ModelChunksTest, WhatHasNoneIsRefused) {
     const Result<ModelChunks> chunks = open(model);
     const PoseSequence poses = bent_poses(model, false);
     const auto code = [&](const PoseSequence& given, const RestoreOptions& options, const char* name) {
-        return write_restored_chunks(*chunks, stream_of(given), options, path(name), kTwoThreads).error().code;
+        return write_restored_chunks(*chunks, frames_of(given), options, path(name), kTwoThreads).error().code;
     };
     EXPECT_EQ(code(poses, {.level = 1}, "a.pc2"), ErrorCode::usage);
     EXPECT_EQ(code(poses, {}, "a.mdd"), ErrorCode::usage);
@@ -183,7 +183,7 @@ TEST_F(ModelChunksTest, WhatHasNoneIsRefused) {
     EXPECT_EQ(code(other, {}, "a.pc2"), ErrorCode::mismatch);
     RunContext cancelled(1);
     cancelled.cancel();
-    EXPECT_EQ(write_restored_chunks(*chunks, stream_of(poses), {}, path("a.pc2"), cancelled).error().code,
+    EXPECT_EQ(write_restored_chunks(*chunks, frames_of(poses), {}, path("a.pc2"), cancelled).error().code,
               ErrorCode::cancelled);
     EXPECT_FALSE(fs::exists(path("a.pc2")));
 }

@@ -59,7 +59,7 @@ py::dict write_moving(const MeshAnimation& animation, const fs::path& path, cons
 
 py::dict export_poses(const Model& model, const PoseSequence& poses, const ExportOptions& options, const fs::path& path,
                       const LongCall& call) {
-    const PoseStream stream = stream_of(poses);
+    const FrameSource<Pose> stream = frames_of(poses);
     const AnimationFormat format = animation_format(path).value();
     if (format == AnimationFormat::glb && options.as_skin) {
         const ExportReport report = call([&](const RunContext& context) {
@@ -74,7 +74,7 @@ py::dict export_poses(const Model& model, const PoseSequence& poses, const Expor
     if (format == AnimationFormat::numbered) {
         const auto mesh = [&](std::size_t frame) { return restorer.mesh(poses.frames[frame], silent); };
         warn(call([&](const RunContext& context) {
-            return write_numbered_meshes(poses.frames.size(), mesh, path, context).value();
+            return write_numbered_meshes({poses.frames.size(), poses.frames_per_second, mesh}, path, context).value();
         }));
         return said_of(poses.frames.size(), poses.frames_per_second, restorer.vertex_count());
     }

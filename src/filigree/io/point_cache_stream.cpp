@@ -118,8 +118,9 @@ Status read_frame(const RandomFile& file, std::uint64_t start, std::size_t frame
                       " is not a finite number.");
 }
 
-PointSource source_of(FilePointer file, std::int32_t frames, double rate, std::uint64_t start, bool is_big_endian) {
-    return {static_cast<std::size_t>(frames), rate,
+MeshAnimation animation_of(FilePointer file, std::int32_t frames, double rate, std::uint64_t start,
+                           bool is_big_endian) {
+    return {nullptr, static_cast<std::size_t>(frames), rate,
             [file = std::move(file), start, is_big_endian](std::size_t frame, std::span<Vec3f> positions) {
                 return read_frame(*file, start, frame, positions, is_big_endian);
             }};
@@ -149,14 +150,13 @@ Status check_sizes(std::size_t frames, std::size_t points, const fs::path& path)
     return Error{ErrorCode::unsupported, path.string() + ": point caches hold at most 2147483647 frames and points."};
 }
 
-Status write_frames(FileWriter& file, const MeshAnimation& animation, const FramePositions& positions,
-                    bool is_big_endian, const RunContext& context) {
+Status write_frames(FileWriter& file, const MeshAnimation& animation, bool is_big_endian, const RunContext& context) {
     std::vector<Vec3f> points(animation.rest->vertex_count());
     const std::string_view bytes(reinterpret_cast<const char*>(points.data()), points.size() * kPointBytes);
     for (std::size_t frame = 0; frame < animation.frames; ++frame) {
         context.report("writing", double(frame) / double(animation.frames));
         if (context.is_cancelled()) return cancelled_error();
-        if (Status fetched = positions(frame, points); !fetched) return fetched;
+        if (Status fetched = animation.positions(frame, points); !fetched) return fetched;
         if (is_big_endian) swap_words(points.data(), 3 * points.size());
         if (Status written = file.write(bytes); !written) return written;
     }
@@ -172,7 +172,7 @@ void append(std::string& bytes, T value) {
 
 } // namespace
 
-Result<PointSource> open_pc2(const fs::path& path, std::size_t points, std::optional<double> frames_per_second) {
+Result<MeshAnimation> open_pc2(const fs::path& path, std::size_t points, std::optional<double> frames_per_second) {
     struct {
         std::int32_t version, points;
         float first_frame, sample_rate;
@@ -198,10 +198,10 @@ Result<PointSource> open_pc2(const fs::path& path, std::size_t points, std::opti
     if (Status sound = check_counts(in, header.frames, header.points, kPc2HeaderBytes, points); !sound)
         return sound.error();
     const double rate = frames_per_second.value_or(kUnsaidRate) / samples;
-    return source_of(*file, header.frames, rate, kPc2HeaderBytes, false);
+    return animation_of(*file, header.frames, rate, kPc2HeaderBytes, false);
 }
 
-Result<PointSource> open_mdd(const fs::path& path, std::size_t points, std::optional<double> frames_per_second) {
+Result<MeshAnimation> open_mdd(const fs::path& path, std::size_t points, std::optional<double> frames_per_second) {
     std::int32_t counts[2] = {}; // frames, points
     const Result<FilePointer> file = RandomFile::open(path);
     if (!file) return file.error();
@@ -216,7 +216,7 @@ Result<PointSource> open_mdd(const fs::path& path, std::size_t points, std::opti
     swap_words(times.data(), times.size());
     Result<double> rate = frames_per_second ? Result<double>(*frames_per_second) : rate_of(in, times);
     if (!rate) return rate.error();
-    return source_of(*file, counts[0], *rate, start, true);
+    return animation_of(*file, counts[0], *rate, start, true);
 }
 
 Result<std::string> pc2_header(std::size_t frames, std::size_t points, const fs::path& path) {
@@ -230,18 +230,16 @@ Result<std::string> pc2_header(std::size_t frames, std::size_t points, const fs:
     return header;
 }
 
-Status write_pc2(const MeshAnimation& animation, const FramePositions& positions, const fs::path& path,
-                 const RunContext& context) {
+Status write_pc2(const MeshAnimation& animation, const fs::path& path, const RunContext& context) {
     const Result<std::string> header = pc2_header(animation.frames, animation.rest->vertex_count(), path);
     if (!header) return header.error();
     Result<FileWriter> file = FileWriter::create(path);
     if (!file) return file.error();
     if (Status written = file->write(*header); !written) return written;
-    return write_frames(*file, animation, positions, false, context);
+    return write_frames(*file, animation, false, context);
 }
 
-Status write_mdd(const MeshAnimation& animation, const FramePositions& positions, const fs::path& path,
-                 const RunContext& context) {
+Status write_mdd(const MeshAnimation& animation, const fs::path& path, const RunContext& context) {
     if (Status sound = check_sizes(animation.frames, animation.rest->vertex_count(), path); !sound) return sound;
     Result<FileWriter> file = FileWriter::create(path);
     if (!file) return file.error();
@@ -258,7 +256,7 @@ Status write_mdd(const MeshAnimation& animation, const FramePositions& positions
         }
         if (frame < animation.frames) append(header, static_cast<float>(double(frame) / animation.frames_per_second));
     }
-    return write_frames(*file, animation, positions, true, context);
+    return write_frames(*file, animation, true, context);
 }
 
 } // namespace filigree
