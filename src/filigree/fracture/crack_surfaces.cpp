@@ -2,6 +2,7 @@
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/fracture/planar_fill.h"
+#include "filigree/mesh/incidence.h"
 
 #include <algorithm>
 #include <cmath>

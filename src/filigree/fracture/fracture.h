@@ -1,7 +1,8 @@
 // A mesh in pieces.
 #pragma once
 
-#include "filigree/fracture/cut_surface.h"
+#include "filigree/fracture/fracture_cells.h"
+#include "filigree/mesh/mesh.h"
 #include "filigree/sample/outward.h"
 
 #include <optional>
@@ -17,6 +18,13 @@ struct FractureOptions {
     /// Each cell that holds matter is one piece and the piece has FractureCells::piece_of's number; islands and small
     /// parts stay with it.
     bool pieces_are_cells = false;
+};
+
+/// Where a vertex that the fracture added to the surface is: weights of two or three of the mesh's vertices (kNoIndex:
+/// none), all corners of one triangle.
+struct FacePoint {
+    std::array<Index, 3> vertices = {kNoIndex, kNoIndex, kNoIndex};
+    std::array<double, 3> weights = {0, 0, 0}; ///< add up to 1
 };
 
 struct CutReport {

@@ -3,6 +3,7 @@
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/random.h"
 #include "filigree/fracture/cell_clumps.h"
+#include "filigree/fracture/crack_warp.h"
 #include "filigree/mesh/triangulate.h"
 #include "filigree/sample/closure.h"
 #include "filigree/sample/spacing_for_count.h"
