@@ -8,7 +8,7 @@
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/render/gl_context.h"
+#include "filigree/render.h"
 #include "filigree/sample/spacing_for_count.h"
 
 #include "interactive/fidelity.h"

@@ -6,7 +6,7 @@
 #include "pins.h"
 
 #include "filigree/present/textured_look.h"
-#include "filigree/render/renderer.h"
+#include "filigree/render.h"
 
 #include <QCoreApplication>
 #include <QEventLoop>

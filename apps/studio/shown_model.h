@@ -6,7 +6,7 @@
 #include "jobs.h"
 
 #include "filigree/present/level_shape.h"
-#include "filigree/render/drawable.h"
+#include "filigree/render.h"
 
 namespace filigree::studio {
 

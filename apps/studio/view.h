@@ -1,7 +1,7 @@
 // How the window looks at the document: camera, style, what else is shown. Not part of what is saved or undone.
 #pragma once
 
-#include "filigree/render/camera.h"
+#include "filigree/render.h"
 #include "filigree/scene/dropped_body.h"
 
 #include <QObject>

@@ -2,7 +2,7 @@
 
 #include "filigree/deform/restored_error.h"
 
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/material.h"
 #include "filigree/sample/spacing_for_count.h"
 
 #include <QCoreApplication>

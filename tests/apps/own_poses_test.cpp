@@ -7,7 +7,7 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/render/picture.h"
+#include "filigree/render.h"
 
 #include <numbers>
 

@@ -1,7 +1,7 @@
+#include "filigree/fracture.h"
 #include "filigree/fracture/broken_model.h"
 
 #include "filigree/deform/space_warp.h"
-#include "filigree/fracture/fracture_pattern.h"
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"

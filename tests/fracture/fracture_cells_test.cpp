@@ -1,5 +1,5 @@
+#include "filigree/fracture.h"
 #include "filigree/fracture/crack_warp.h"
-#include "filigree/fracture/fracture_cells.h"
 
 #include "filigree/core/random.h"
 #include "filigree/fracture/voronoi.h"

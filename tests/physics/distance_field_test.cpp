@@ -1,4 +1,4 @@
-#include "filigree/physics/distance_field.h"
+#include "filigree/physics/body.h"
 
 #include "filigree/core/random.h"
 #include "filigree/io/mesh_file.h"

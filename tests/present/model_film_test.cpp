@@ -2,7 +2,7 @@
 
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/render/gl_context.h"
+#include "filigree/render.h"
 
 #include <filesystem>
 #include <gtest/gtest.h>

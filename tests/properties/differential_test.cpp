@@ -1,7 +1,7 @@
 // What has to come out the same two ways, on random meshes: threads, order, place, precision, file and memory.
 // rapidcheck prints the seed of a failure; scripts/properties tries many more.
 #include "filigree/coding/mesh_code.h"
-#include "filigree/fracture/fracture.h"
+#include "filigree/fracture.h"
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/io/file.h"

@@ -5,7 +5,7 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/render/gl_context.h"
+#include "filigree/render.h"
 #include "hierarchy/stripping.h"
 #include "io/corpus.h"
 

@@ -1,4 +1,5 @@
 #include "filigree/fracture/broken_model.h"
+#include "filigree/fracture.h"
 
 #include "filigree/fracture/crack_surfaces.h"
 #include "filigree/fracture/planar_fill.h"

@@ -1,7 +1,7 @@
 // The distortion of space that makes cracks rough: what is a plane on the grid is a rough surface in space.
 #pragma once
 
-#include "filigree/fracture/fracture_cells.h"
+#include "filigree/fracture.h"
 
 #include <array>
 #include <cstdint>

@@ -1,8 +1,8 @@
 // A surface cut along the borders of cells.
 #pragma once
 
+#include "filigree/fracture.h"
 #include "filigree/fracture/crack_warp.h"
-#include "filigree/fracture/fracture.h"
 #include "filigree/fracture/voronoi.h"
 #include "filigree/mesh/surface.h"
 

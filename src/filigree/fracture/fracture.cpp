@@ -1,4 +1,4 @@
-#include "filigree/fracture/fracture.h"
+#include "filigree/fracture.h"
 
 #include "filigree/fracture/piece_assembly.h"
 #include "filigree/sample/closure.h"

@@ -1,4 +1,4 @@
-#include "filigree/fracture/fracture_cells.h"
+#include "filigree/fracture.h"
 
 #include "filigree/fracture/crack_warp.h"
 #include "filigree/fracture/voronoi.h"

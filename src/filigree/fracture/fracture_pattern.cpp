@@ -1,4 +1,4 @@
-#include "filigree/fracture/fracture_pattern.h"
+#include "filigree/fracture.h"
 
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/random.h"

@@ -1,7 +1,7 @@
 // A mesh in the shape a GPU draws: triangles over vertices that each have one normal and one UV.
 #pragma once
 
-#include "filigree/render/drawable.h"
+#include "filigree/render.h"
 
 namespace filigree {
 

@@ -1,6 +1,6 @@
 #include "filigree/scene/scene_keys.h"
 
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/material.h"
 
 #include <algorithm>
 #include <array>

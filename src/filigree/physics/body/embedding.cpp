@@ -1,8 +1,7 @@
-#include "filigree/physics/embedding.h"
+#include "filigree/physics/body/embedding.h"
 
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
-#include "filigree/physics/cells.h"
 
 #include <Eigen/LU>
 #include <algorithm>

@@ -1,7 +1,9 @@
-#include "filigree/physics/broken_body.h"
+#include "filigree/physics/breaking/broken_body.h"
 
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/body/embedding.h"
+#include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/body/surface_points.h"
 #include "filigree/physics/breaking/piece_regions.h"
 
@@ -437,19 +439,21 @@ Index BrokenBody::piece_at(const Vec3d& rest_point) const {
     return 0; // a piece without matter: any will do
 }
 
-Result<BrokenBody> break_body(std::shared_ptr<const Body> whole, Partition partition, const RunContext& context,
-                              BrokenBodyReport* report) {
+Result<std::shared_ptr<const BrokenBody>> break_body(std::shared_ptr<const Body> whole, Partition partition,
+                                                     const RunContext& context, BrokenBodyReport* report) {
     if (partition.count == 0 || !partition.piece_at)
         return Error{ErrorCode::usage, "A body breaks into one piece or more; the partition has none."};
     if (whole->material.model != MaterialModel::fem)
         return Error{ErrorCode::unsuitable,
                      "Only bodies of the model fem break; it yields before that where it has a yield stress."};
     Result<BrokenBody> broken = BodyBreaker(std::move(whole), std::move(partition), context).run();
-    if (!broken || !report) return broken;
-    *report = {.pieces = broken->pieces.size()};
-    for (const CrackFacet& facet : broken->facets) report->crack_area += double(facet.area);
+    if (!broken) return broken.error();
+    const auto kept = std::make_shared<const BrokenBody>(std::move(*broken));
+    if (!report) return kept;
+    *report = {.pieces = kept->pieces.size()};
+    for (const CrackFacet& facet : kept->facets) report->crack_area += double(facet.area);
     std::vector<double> volumes;
-    for (const auto& piece : broken->pieces) {
+    for (const auto& piece : kept->pieces) {
         double volume = 0;
         for (const float v : piece->volume) volume += double(v);
         volumes.push_back(volume);
@@ -459,7 +463,7 @@ Result<BrokenBody> break_body(std::shared_ptr<const Body> whole, Partition parti
         report->least_volume = volumes.front();
         report->median_volume = volumes[volumes.size() / 2];
     }
-    return broken;
+    return kept;
 }
 
 } // namespace filigree

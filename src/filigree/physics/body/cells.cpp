@@ -1,4 +1,4 @@
-#include "filigree/physics/cells.h"
+#include "filigree/physics/body/make_cells.h"
 
 #include "filigree/core/parallel_for.h"
 

@@ -1,4 +1,4 @@
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/material.h"
 
 #include <array>
 

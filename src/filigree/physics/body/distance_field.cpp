@@ -1,4 +1,4 @@
-#include "filigree/physics/distance_field.h"
+#include "filigree/physics/body.h"
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/closest_point.h"

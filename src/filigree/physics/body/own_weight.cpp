@@ -1,4 +1,4 @@
-#include "filigree/physics/own_weight.h"
+#include "filigree/physics/body/own_weight.h"
 
 #include "filigree/core/text.h"
 

@@ -1,4 +1,4 @@
-#include "filigree/physics/grid_limits.h"
+#include "filigree/physics/grid/grid_limits.h"
 
 #include "filigree/physics/contact/obstacle_surface.h"
 

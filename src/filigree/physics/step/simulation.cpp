@@ -1,5 +1,6 @@
 #include "filigree/physics/simulation.h"
 
+#include "filigree/physics/body/embedding.h"
 #include "filigree/physics/rigid/rigid_body.h"
 #include "filigree/physics/rigid/rigid_state.h"
 #include "filigree/physics/rigid/sleep.h"

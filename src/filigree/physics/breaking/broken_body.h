@@ -1,19 +1,10 @@
-// A body as it is when it breaks: a body for each piece, and what holds them together. Nothing here moves.
+// A body cut into pieces: a body for each piece, and what holds the pieces together. Nothing here moves.
 #pragma once
 
 #include "filigree/mesh/incidence.h"
-#include "filigree/physics/body.h"
-
-#include <functional>
-#include <vector>
+#include "filigree/physics/world.h"
 
 namespace filigree {
-
-/// Space cut into pieces.
-struct Partition {
-    Index count = 0;                             ///< of pieces, 1 or more
-    std::function<Index(const Vec3d&)> piece_at; ///< of a point of the body at rest, m: below count. Many threads ask.
-};
 
 /// What pieces hold each other by in one cell.
 struct CrackFacet {
@@ -66,16 +57,5 @@ struct BrokenBody {
     Index piece_at(const Vec3d& rest_point) const;
     Partition partition;
 };
-
-struct BrokenBodyReport {
-    std::size_t pieces = 0;                     ///< with matter
-    double crack_area = 0;                      ///< m^2
-    double least_volume = 0, median_volume = 0; ///< m^3, of pieces
-};
-
-/// Cost: some 2 us a cell that pieces share, and a distance field a piece. Errors: usage (no pieces), unsuitable
-/// (another material than fem), cancelled; as of DistanceField::create.
-Result<BrokenBody> break_body(std::shared_ptr<const Body> whole, Partition partition, const RunContext& context,
-                              BrokenBodyReport* report = nullptr);
 
 } // namespace filigree
