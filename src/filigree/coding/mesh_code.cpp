@@ -136,20 +136,14 @@ std::vector<Index> read_permutation(SymbolReader& in, unsigned context, std::siz
     return order;
 }
 
-std::vector<Index> inverse_of(std::span<const Index> order) {
-    std::vector<Index> inverse(order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) inverse[order[i]] = static_cast<Index>(i);
-    return inverse;
-}
-
 /// Back into the order of the source.
 Mesh put_back(const Mesh& mesh, std::string_view stream) {
     SymbolReader in(stream, kOrderContexts);
     const std::vector<Index> vertex = read_permutation(in, kVertexOrder, mesh.vertex_count()),
                              face = read_permutation(in, kFaceOrder, mesh.face_count());
     OrderedMesh back; // what it was coded from is what comes out: vertex i is the code's back.vertex[i]
-    back.vertex = inverse_of(vertex);
-    back.face = inverse_of(face);
+    back.vertex = inverse_order(vertex);
+    back.face = inverse_order(face);
     back.first_corner.resize(face.size());
     for (std::size_t f = 0; f < face.size(); ++f) { // the code's face f began with corner k of the source's
         const std::uint32_t k = in.number(kFirstCorner), size = mesh.face_size(f);

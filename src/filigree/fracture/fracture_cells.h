@@ -3,7 +3,7 @@
 
 #include "filigree/fracture/crack_warp.h"
 #include "filigree/fracture/voronoi.h"
-#include "filigree/mesh/incidence.h"
+#include "filigree/mesh/edges.h"
 
 namespace filigree {
 

@@ -139,12 +139,9 @@ private:
         }
         std::sort(edges.begin(), edges.end());
         edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-        links_.offsets.assign(vertex_count() + 1, 0);
-        for (const auto& [from, to] : edges) {
-            ++links_.offsets[from + 1];
-            links_.items.push_back(to);
-        }
-        for (std::size_t v = 0; v < vertex_count(); ++v) links_.offsets[v + 1] += links_.offsets[v];
+        links_ = make_lists<Index>(vertex_count(), [&](const auto& add) {
+            for (const auto& [from, to] : edges) add(from, to);
+        });
     }
 
     void split_into_parts() {

@@ -46,10 +46,4 @@ Mesh with_vertex_order(Mesh mesh, std::span<const Index> order, const RunContext
     return mesh;
 }
 
-std::vector<Index> inverse_order(std::span<const Index> order) {
-    std::vector<Index> inverse(order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) inverse[order[i]] = static_cast<Index>(i);
-    return inverse;
-}
-
 } // namespace filigree

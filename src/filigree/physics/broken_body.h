@@ -1,7 +1,7 @@
 // A body as it is when it breaks: a body for each piece, and what holds them together. Nothing here moves.
 #pragma once
 
-#include "filigree/mesh/incidence.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/physics/body.h"
 
 #include <functional>
