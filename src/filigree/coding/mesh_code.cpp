@@ -6,6 +6,7 @@
 #include "filigree/coding/integer_frame.h"
 #include "filigree/coding/mesh_levels.h"
 #include "filigree/coding/regular_code.h"
+#include "filigree/mesh/morton.h"
 
 #include <algorithm>
 #include <cmath>
@@ -165,12 +166,9 @@ Mesh put_back(const Mesh& mesh, std::string_view stream) {
 void sort_loose(const Mesh& mesh, const CodedMesh& coded, std::span<Index> loose) {
     std::vector<std::pair<std::uint64_t, Index>> keys;
     for (const Index v : loose) {
-        const FinePlace place = fine_place(mesh.positions[v], coded);
-        std::uint64_t key = 0;
-        for (unsigned bit = 0; bit < 20; ++bit)
-            for (std::size_t k = 0; k < 3; ++k)
-                key |= std::uint64_t(std::uint32_t(place[k]) >> bit & 1) << (3 * bit + k);
-        keys.emplace_back(key, v);
+        constexpr std::uint32_t kCounted = (1u << 20) - 1; // bits of a coordinate
+        const auto [x, y, z] = fine_place(mesh.positions[v], coded);
+        keys.emplace_back(morton_key(x & kCounted, y & kCounted, z & kCounted), v);
     }
     std::ranges::sort(keys);
     for (std::size_t i = 0; i < loose.size(); ++i) loose[i] = keys[i].second;

@@ -1,6 +1,7 @@
 #include "filigree/fracture/cut_surface.h"
 
 #include "filigree/core/disjoint_sets.h"
+#include "filigree/core/hash.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/random.h"
 #include "filigree/mesh/edges.h"
@@ -21,9 +22,7 @@ constexpr std::size_t kMostGrowth = 3, kFewestRefined = 500'000;
 
 using Name = std::array<Index, 4>;
 struct NameHash {
-    std::size_t operator()(const Name& name) const {
-        return random_bits(std::uint64_t(name[0]) << 32 | name[1], std::uint64_t(name[2]) << 32 | name[3]);
-    }
+    std::size_t operator()(const Name& name) const { return hash_words(name[0], name[1], name[2], name[3]); }
 };
 
 /// Cones over the open borders, each around the middle of a connected border.

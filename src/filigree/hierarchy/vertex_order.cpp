@@ -1,7 +1,7 @@
 #include "filigree/hierarchy/vertex_order.h"
 
 #include "filigree/core/parallel_for.h"
-#include "filigree/hierarchy/morton_order.h"
+#include "filigree/mesh/morton.h"
 
 #include <tbb/parallel_sort.h>
 
