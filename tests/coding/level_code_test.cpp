@@ -28,7 +28,7 @@ void expect_closed(const ClosedMap& map) {
     for (Index h = 0; h < map.opposite.size(); ++h) {
         ASSERT_LT(map.opposite[h], map.opposite.size());
         ASSERT_EQ(map.opposite[map.opposite[h]], h);
-        ASSERT_EQ(map.origin(map.opposite[h]), map.origin(ClosedMap::next(h)));
+        ASSERT_EQ(map.origin(map.opposite[h]), map.origin(next_half_edge(h)));
     }
 }
 

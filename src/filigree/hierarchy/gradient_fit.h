@@ -3,7 +3,7 @@
 
 #include "filigree/core/run_context.h"
 #include "filigree/hierarchy/height_law.h"
-#include "filigree/mesh/incidence.h"
+#include "filigree/mesh/edges.h"
 
 namespace filigree {
 

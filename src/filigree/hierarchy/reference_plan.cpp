@@ -1,5 +1,6 @@
 #include "filigree/hierarchy/reference_plan.h"
 
+#include "filigree/core/large_memory.h"
 #include "filigree/core/parallel_for.h"
 
 #include <Eigen/Geometry>
@@ -9,17 +10,13 @@
 #include <new>
 #include <utility>
 
-#if defined(__linux__)
-#include <sys/mman.h>
-#endif
-
 namespace filigree::reference {
 namespace {
 
 // Grids above this are written past the caches, which they would only flush.
 constexpr std::size_t kStreamBytes = std::size_t{16} << 20;
 constexpr std::size_t kPointsPerTask = 65536;
-constexpr std::align_val_t kLargePage{std::size_t{2} << 20}, kLine{sizeof(Line)};
+constexpr std::align_val_t kLargePage{kHugePage}, kLine{sizeof(Line)};
 std::align_val_t alignment_of(std::size_t bytes) {
     return bytes >= 2 * static_cast<std::size_t>(kLargePage) ? kLargePage : kLine;
 }
@@ -117,9 +114,7 @@ struct ArraySink {
 
 void* allocate_large_pages(std::size_t bytes) {
     void* data = ::operator new(bytes, alignment_of(bytes));
-#if defined(__linux__)
-    if (alignment_of(bytes) == kLargePage) madvise(data, bytes, MADV_HUGEPAGE); // a wish: no harm if it is not heard
-#endif
+    if (alignment_of(bytes) == kLargePage) ask_for_huge_pages(data, bytes);
     return data;
 }
 void free_large_pages(void* data, std::size_t bytes) { ::operator delete(data, alignment_of(bytes)); }

@@ -1,9 +1,9 @@
 #include "filigree/hierarchy/simplify_levels.h"
 
 #include "filigree/core/parallel_for.h"
-#include "filigree/hierarchy/morton_order.h"
 #include "filigree/hierarchy/nearest_sources.h"
 #include "filigree/hierarchy/simplify.h"
+#include "filigree/mesh/morton.h"
 #include "filigree/mesh/normals.h"
 
 #include <algorithm>

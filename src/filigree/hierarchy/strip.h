@@ -48,7 +48,7 @@ struct Stripped {
 /// Strips a mesh. The blend code takes every mesh that has a vertex: what it cannot bind well it counts. The reference
 /// code needs quads with subdivision connectivity.
 /// Errors: usage (options that make no sense; check_mesh refuses the mesh), unsuitable (no vertices; more triangles
-/// than kMostListedTriangles, see mesh/incidence.h; no subdivision connectivity), cancelled. Cost O(F) while the mesh
+/// than kMostListedTriangles, see mesh/edges.h; no subdivision connectivity), cancelled. Cost O(F) while the mesh
 /// has more than StripOptions::one_piece vertices, and O(F log F) for what is simplified in one piece: about 3
 /// processor seconds a million vertices. Same bytes for any number of threads.
 Result<Stripped> strip(Mesh mesh, const StripOptions& options, const RunContext& context);

@@ -9,7 +9,7 @@
 #include "filigree/io/model_file.h"
 #include "filigree/io/shared_steps.h"
 #include "filigree/io/temporary_file.h"
-#include "filigree/mesh/incidence.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/mesh/normals.h"
 
 #include <algorithm>

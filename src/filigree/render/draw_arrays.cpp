@@ -39,21 +39,10 @@ std::vector<Vec3f> face_areas(const Mesh& mesh, std::span<const Vec3f> positions
 
 Vec3f unit(const Vec3f& v) { return v.cast<double>().stableNormalized().cast<float>(); }
 
-/// Corners by the place of their vertex.
-struct CornersAt {
-    std::vector<Index> offsets; ///< per place
-    std::vector<Index> corners;
-};
-
-CornersAt corners_at_places(const Mesh& mesh, std::span<const Index> place) {
-    CornersAt at;
-    at.offsets.assign(place.size() + 1, 0);
-    for (Index v : mesh.corners) ++at.offsets[place[v] + 1];
-    std::partial_sum(at.offsets.begin(), at.offsets.end(), at.offsets.begin());
-    std::vector<Index> next(at.offsets.begin(), at.offsets.end() - 1);
-    at.corners.resize(mesh.corner_count());
-    for (Index c = 0; c < mesh.corner_count(); ++c) at.corners[next[place[mesh.corners[c]]]++] = c;
-    return at;
+IndexLists corners_at_places(const Mesh& mesh, std::span<const Index> place) {
+    return make_lists<Index>(place.size(), [&](const auto& add) {
+        for (Index c = 0; c < mesh.corner_count(); ++c) add(place[mesh.corners[c]], c);
+    });
 }
 
 /// Normals of the corners at one place.
@@ -125,13 +114,6 @@ private:
     float least_cosine_;
     std::vector<Vec3f> areas_, units_;
 };
-
-std::vector<Index> faces_of_corners(const Mesh& mesh) {
-    std::vector<Index> face_of_corner(mesh.corner_count());
-    for (Index f = 0; f < mesh.face_count(); ++f)
-        std::fill(face_of_corner.begin() + mesh.face_offsets[f], face_of_corner.begin() + mesh.face_offsets[f + 1], f);
-    return face_of_corner;
-}
 
 /// The vertices that are drawn: the corners at one place fall together where vertex, normal and UV agree.
 class DrawVertices {
@@ -254,8 +236,9 @@ void add_triangles(const Mesh& mesh, const Triangulation& cut, const SurfaceOpti
 Result<DrawArrays> make_draw_arrays(const Mesh& mesh, std::span<const Vec3f> positions, const SurfaceOptions& options,
                                     const RunContext& context, NormalFaces normal_faces) {
     DrawArrays arrays;
-    const std::vector<Index> place = weld_map(positions), face_of_corner = faces_of_corners(mesh);
-    const CornersAt at = corners_at_places(mesh, place);
+    const std::vector<Index> place = weld_map(positions);
+    const PolygonCorners polygons(mesh.face_offsets);
+    const IndexLists at = corners_at_places(mesh, place);
     if (context.is_cancelled()) return cancelled_error();
     CornerNormals corner_normals(mesh, positions, options, context);
     DrawVertices vertices(mesh, normal_faces, arrays);
@@ -266,10 +249,10 @@ Result<DrawArrays> make_draw_arrays(const Mesh& mesh, std::span<const Vec3f> pos
             if (context.is_cancelled()) return cancelled_error();
             context.report("preparing to draw", double(p) / double(place.size()));
         }
-        const std::span corners(at.corners.data() + at.offsets[p], at.offsets[p + 1] - at.offsets[p]);
+        const std::span corners = at[p];
         if (corners.empty()) continue;
         faces.clear();
-        for (Index c : corners) faces.push_back(face_of_corner[c]);
+        for (Index c : corners) faces.push_back(polygons.face(c));
         corner_normals.at(corners, faces, normals);
         vertices.add(corners, faces, normals, corner_normals);
     }

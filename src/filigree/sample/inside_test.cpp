@@ -1,9 +1,9 @@
 #include "filigree/sample/inside_test.h"
 
+#include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"
 
 #include <algorithm>
-#include <chrono>
 
 namespace filigree {
 
@@ -56,20 +56,19 @@ Result<std::vector<std::uint8_t>> InsideTest::contains(std::span<const Vec3d> po
 
 Result<std::vector<Vec3d>> points_inside(const Mesh& mesh, std::span<const Vec3d> points, InsideOptions options,
                                          const RunContext& context, InsideReport* report) {
-    using Clock = std::chrono::steady_clock;
     if (options.method == InsideMethod::automatic) options.method = InsideMethod::rays;
-    const Clock::time_point begin = Clock::now();
+    const double begin = now_seconds();
     const Result<InsideTest> test = InsideTest::create(mesh, options, context);
     if (!test) return test.error();
-    const Clock::time_point prepared = Clock::now();
+    const double prepared = now_seconds();
     const Result<std::vector<std::uint8_t>> inside = test->contains(points, context);
     if (!inside) return inside.error();
     if (report) {
         report->used = test->used();
         report->closure = test->closure();
         report->outward = test->outward();
-        report->setup_seconds = std::chrono::duration<double>(prepared - begin).count();
-        report->seconds = std::chrono::duration<double>(Clock::now() - prepared).count();
+        report->setup_seconds = prepared - begin;
+        report->seconds = now_seconds() - prepared;
     }
     std::vector<Vec3d> chosen;
     for (std::size_t i = 0; i < points.size(); ++i)

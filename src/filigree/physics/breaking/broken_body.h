@@ -1,7 +1,7 @@
 // A body cut into pieces: a body for each piece, and what holds the pieces together. Nothing here moves.
 #pragma once
 
-#include "filigree/mesh/incidence.h"
+#include "filigree/core/lists.h"
 #include "filigree/physics/world.h"
 
 namespace filigree {

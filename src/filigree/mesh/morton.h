@@ -1,4 +1,4 @@
-// Places as numbers, so that what is near in space is mostly near in them.
+// Places as numbers: places with numbers near each other are near in space [Morton 1966].
 #pragma once
 
 #include "filigree/core/types.h"
@@ -9,7 +9,21 @@
 
 namespace filigree {
 
-/// The bits of a place's coordinates in turn, from the highest on [Morton 1966]: 10 an axis.
+/// The lower 21 bits of x, two zeros between each.
+constexpr std::uint64_t spread_bits(std::uint64_t x) {
+    x &= 0x1fffff;
+    x = (x | x << 32) & 0x001f00000000ffff;
+    x = (x | x << 16) & 0x001f0000ff0000ff;
+    x = (x | x << 8) & 0x100f00f00f00f00f;
+    x = (x | x << 4) & 0x10c30c30c30c30c3;
+    return (x | x << 2) & 0x1249249249249249;
+}
+/// The bits of three coordinates in turn, those of z highest; 21 bits of each.
+constexpr std::uint64_t morton_key(std::uint64_t x, std::uint64_t y, std::uint64_t z) {
+    return spread_bits(x) | spread_bits(y) << 1 | spread_bits(z) << 2;
+}
+
+/// Places of a box on a lattice of 1,024 steps along its longest side: their keys fit into 32 bits.
 class MortonOrder {
 public:
     static constexpr std::uint32_t kBits = 10, kSteps = 1u << kBits;
@@ -17,13 +31,6 @@ public:
     explicit MortonOrder(const Box& box) : low_(box.min.cast<float>()) {
         const double longest = box.size().maxCoeff();
         to_steps_ = longest > 0 ? float((kSteps - 1) / longest) : 0;
-    }
-
-    /// Of steps along an axis, every third bit.
-    static std::uint32_t spread(std::uint32_t steps) {
-        std::uint32_t bits = 0;
-        for (std::uint32_t bit = 0; bit < kBits; ++bit) bits |= (steps >> bit & 1) << (3 * bit);
-        return bits;
     }
 
     /// Whole steps from the box's corner; outside it those of its side.
@@ -36,7 +43,7 @@ public:
     }
     std::uint32_t key(const Vec3f& place) const {
         const auto [x, y, z] = steps(place);
-        return spread(x) | spread(y) << 1 | spread(z) << 2;
+        return static_cast<std::uint32_t>(morton_key(x, y, z));
     }
 
 private:
