@@ -114,7 +114,7 @@ struct Hand {
 
 /// Something that warms bodies of mpm: matter in a ball takes up its power, shared out by mass.
 struct HeatSource {
-    Ball ball;
+    Ball ball = {.radius = 0.1};
     Keyed<Vec3d> move{{}, {}, Vec3d::Zero()}; ///< m
     Keyed<double> power{{}, {}, 0};           ///< W; below 0 it cools
 };
