@@ -17,7 +17,7 @@ namespace {
 SceneFile thrown_cube() {
     SceneFile scene;
     scene.frames = 40;
-    scene.gravity = {0, 0, -9.81};
+    scene.world.gravity = {0, 0, -9.81};
     SceneBody& cube = scene.bodies.emplace_back();
     cube.name = cube.shape = "wavy-cube";
     cube.material.young_modulus = 3e6;

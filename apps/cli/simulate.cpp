@@ -305,7 +305,7 @@ private:
         if (!outputs_.films.empty()) renderer_.emplace(require(HeadlessRenderer::create()));
         for (const std::string& path : outputs_.films)
             films_.push_back(require(
-                FilmWriter::create(path, scene_.picture.width, scene_.picture.height, scene_.step.frames_per_second)));
+                FilmWriter::create(path, scene_.picture.size[0], scene_.picture.size[1], scene_.step.frames_per_second)));
     }
 
     void save() { require(write_file(options_.save, run_->save())); }

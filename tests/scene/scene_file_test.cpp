@@ -20,11 +20,11 @@ TEST_F(SceneFileTest, HoldsWhatIsWrittenAndTheDefaultsElse) {
     EXPECT_EQ(scene.bodies[0].driver, 60U);
     EXPECT_EQ(scene.bodies[0].centre, Vec3d(0, 0.62, 0));
     EXPECT_FALSE(scene.bodies[0].color);
-    EXPECT_EQ(scene.gravity, Vec3d(0, -9.81, 0));
+    EXPECT_EQ(scene.world.gravity, Vec3d(0, -9.81, 0));
     ASSERT_EQ(scene.obstacles.size(), 1U);
     EXPECT_EQ(scene.obstacles[0].color, Vec3f(1, 0, 0));
-    EXPECT_TRUE(scene.obstacles[0].motion.moves());
-    EXPECT_EQ(scene.obstacles[0].motion.move.values[1], Vec3d(0, 2, 0));
+    EXPECT_TRUE(scene.obstacles[0].obstacle.motion.moves());
+    EXPECT_EQ(scene.obstacles[0].obstacle.motion.move.values[1], Vec3d(0, 2, 0));
     EXPECT_EQ(scene.picture.up, UpAxis::z);
 }
 
@@ -34,7 +34,7 @@ TEST_F(SceneFileTest, TwoMomentsOfOneTimeAreAJump) {
                "turn = [{ time = 0, value = [0, 350, 0] }, { time = 1, value = [0, 370, 0] }, { time = " + second +
                ", value = [0, 10, 0] }, { time = 2, value = [0, 30, 0] }]\n";
     };
-    const Keyed<Vec3d> angle = scene(turned("1")).obstacles[0].motion.angle;
+    const Keyed<Vec3d> angle = scene(turned("1")).obstacles[0].obstacle.motion.angle;
     const double degree = std::numbers::pi / 180;
     EXPECT_NEAR(angle.at(0.5).y(), 360 * degree, 1e-9);
     EXPECT_NEAR(angle.at(1.5).y(), 20 * degree, 1e-9);
@@ -110,7 +110,7 @@ TEST_F(SceneFileTest, RepeatedBodiesAreNamedOneOrAll) {
     const std::string bar = "[[body]]\nname = \"bar\"\nshape = \"bar\"\n";
     const auto pair = [&](const std::string& first) {
         return scene(stones + bar + "[[pair]]\nfirst = \"" + first + "\"\nsecond = \"bar\"\nfriction = 1\n")
-            .pairs[0]
+            .world.group_pairs[0]
             .first;
     };
     EXPECT_EQ(pair("stone").size(), 12U);
@@ -162,7 +162,7 @@ TEST_F(SceneFileTest, ValuesTakeThePlaceOfWhatIsWritten) {
     EXPECT_EQ(scene.bodies[1].material.young_modulus, 2e4);
     EXPECT_EQ(scene.bodies[0].material.density, plain.bodies[0].material.density);
     EXPECT_EQ(scene.bodies[1].material.density, 600) << "the last one holds";
-    EXPECT_EQ(scene.gravity, Vec3d(0, -1, 0)) << "the file has no [world]";
+    EXPECT_EQ(scene.world.gravity, Vec3d(0, -1, 0)) << "the file has no [world]";
     EXPECT_NE(scene.content, plain.content);
     EXPECT_EQ(with({{"body", "young_modulus", 1, "5e4"}}).value().content, plain.content) << "what it says already";
     EXPECT_EQ(said({"body", "yung", 0, "1"}),
@@ -221,10 +221,41 @@ TEST_F(SceneFileTest, ErrorsInALineEndInOneFullStop) {
         EXPECT_EQ(scene_error(scene, 7, ErrorCode::mismatch, what).message, scene.path + ":7: no such thing.");
 }
 
+TEST_F(SceneFileTest, AKeyOfAnotherModelIsRefusedWithItsModels) {
+    const auto said = [&](const std::string& model, const std::string& key) {
+        return refusal("[[body]]\nshape = \"bar\"\nmodel = \"" + model + "\"\n" + key + " = 0.1\n");
+    };
+    EXPECT_EQ(said("springs", "yield_stress"), "4: 'yield_stress' in [[body]] is for model = \"fem\", \"meshfree\" or "
+                                               "\"mpm\", and this body's is \"springs\".");
+    EXPECT_EQ(said("fem", "bending"),
+              "4: 'bending' in [[body]] is for model = \"springs\", and this body's is \"fem\".");
+}
+
+TEST(SceneKeys, WithoutAKeyTheFreshStructHolds) {
+    const auto unset = [](const char* table, const char* key) { return unset_text(*find_key(table, key)); };
+    EXPECT_EQ(unset("world", "body_friction"), "0.3");
+    EXPECT_EQ(unset("world", "gravity"), "[0, -9.81, 0]");
+    EXPECT_EQ(unset("world", "air_temperature"), "293");
+    EXPECT_EQ(unset("simulation", "mode"), "auto");
+    EXPECT_EQ(unset("fracture", "pattern"), "even");
+    EXPECT_EQ(unset("obstacle", "visible"), "true");
+    EXPECT_EQ(unset("picture", "size"), "[960, 720]");
+    EXPECT_EQ(unset("body", "density"), "by the material") << "words where the struct does not say it";
+}
+
+TEST(SceneKeys, AMemberIsOfTheOwnerThatIsGiven) {
+    SceneFile one, other;
+    const SceneKey& key = *find_key("world", "air_density");
+    *std::get<double*>(key.place(&one)) = 3;
+    EXPECT_EQ(one.world.air_density, 3);
+    EXPECT_EQ(other.world.air_density, 0);
+    EXPECT_EQ(*std::get<double*>(key.fresh()), 0);
+}
+
 TEST(SceneKeys, EveryKeyIsInTheManual) {
     const std::string manual = scene_manual();
-    for (const KeyRule& rule : scene_keys())
-        EXPECT_NE(manual.find("| `" + std::string(rule.key) + "` |"), std::string::npos) << rule.key;
+    for (const SceneKey& key : scene_keys())
+        EXPECT_NE(manual.find("| `" + std::string(key.name) + "` |"), std::string::npos) << key.name;
 }
 
 } // namespace

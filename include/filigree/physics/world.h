@@ -143,7 +143,7 @@ struct Hand {
 
 /// A source of heat for bodies of mpm: the matter inside a ball takes up the power, each particle by its mass.
 struct HeatSource {
-    Ball ball;
+    Ball ball = {.radius = 0.1};              ///< m
     Keyed<Vec3d> move{{}, {}, Vec3d::Zero()}; ///< m
     Keyed<double> power{{}, {}, 0};           ///< W; below 0 it cools
 };

@@ -1,8 +1,8 @@
 #include "filigree/fracture/crack_surfaces.h"
 
+#include "filigree/core/lists.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/fracture/planar_fill.h"
-#include "filigree/mesh/incidence.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 #include "filigree/fracture.h"
 
+#include "filigree/core/lists.h"
 #include "filigree/fracture/crack_warp.h"
 #include "filigree/fracture/voronoi.h"
-#include "filigree/mesh/incidence.h"
 
 #include <algorithm>
 #include <cmath>

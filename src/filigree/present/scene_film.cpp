@@ -61,14 +61,14 @@ public:
             if (const Drawable* drawable = obstacle_at(k, number))
                 shown.objects.push_back({drawable, {.color = ready_.drawn[k].color, .gloss = 0.1f}});
         const ScenePicture& picture = scene_.picture;
-        if (picture.background_top) shown.background.top = *picture.background_top;
-        if (picture.background_bottom) shown.background.bottom = *picture.background_bottom;
+        if (picture.background.top) shown.background.top = *picture.background.top;
+        if (picture.background.bottom) shown.background.bottom = *picture.background.bottom;
         shown.up = picture.up;
         shown.ground = picture.ground;
         shown.fixed_ground = true;
         shown.ground_level = ground_level_;
-        return renderer.picture(shown, camera_,
-                                {.width = picture.width, .height = picture.height, .passes = picture.passes}, quiet_);
+        return renderer.picture(
+            shown, camera_, {.width = picture.size[0], .height = picture.size[1], .passes = picture.passes}, quiet_);
     }
     std::size_t frames() const { return frames_; }
     std::vector<std::string> warnings;
@@ -184,7 +184,7 @@ private:
         leave_out_strays(seen);
         if (scene_.picture.obstacles) see_obstacles(seen);
         const ScenePicture& picture = scene_.picture;
-        const double aspect = double(picture.width) / picture.height;
+        const double aspect = double(picture.size[0]) / picture.size[1];
         if (picture.eye) {
             camera_.eye = *picture.eye - ready_.origin;
             camera_.target = *picture.target - ready_.origin;

@@ -14,7 +14,7 @@ constexpr double kGrowth = 0.01, kGrowthOfWhatBreaks = 0.05, kGrowthAfterWork = 
 
 double last_time(const std::vector<double>& times) { return times.empty() ? 0 : times.back(); }
 
-double end_of(const SceneMotion& motion) {
+double end_of(const RigidMotion& motion) {
     return std::max(last_time(motion.move.times), last_time(motion.angle.times));
 }
 
@@ -27,8 +27,8 @@ double end_of(const Keyed<Vec3d>& push) {
 /// Whether heat comes to a body or goes: what melts and sets is stiff in another shape.
 bool is_heated(const SceneFile& scene, const SceneBody& body) {
     if (!body.material.melts()) return false;
-    const auto warms = [](const SceneObstacle& obstacle) { return obstacle.heat_transfer > 0; };
-    return scene.air_heat_transfer > 0 || !scene.heat_sources.empty() || body.material.heating != 0 ||
+    const auto warms = [](const SceneObstacle& obstacle) { return obstacle.obstacle.heat_transfer > 0; };
+    return scene.world.air_heat_transfer > 0 || !scene.world.heat_sources.empty() || body.material.heating != 0 ||
            body.material.conductivity > 0 || std::ranges::any_of(scene.obstacles, warms);
 }
 
@@ -59,9 +59,9 @@ double EnergyWatch::excess(const Energy& energy, double allowed, double least) {
 }
 
 double left_alone_from(const SceneFile& scene) {
-    double from = end_of(scene.wind);
+    double from = end_of(scene.world.wind);
     for (const ScenePin& pin : scene.pins) from = std::max(from, end_of(pin.motion));
-    for (const SceneObstacle& obstacle : scene.obstacles) from = std::max(from, end_of(obstacle.motion));
+    for (const SceneObstacle& obstacle : scene.obstacles) from = std::max(from, end_of(obstacle.obstacle.motion));
     for (const SceneForce& force : scene.forces) from = std::max(from, end_of(force.newtons));
     for (const SceneHand& hand : scene.hands) from = std::max(from, hand.hand.until);
     for (const SceneBody& body : scene.bodies)

@@ -5,13 +5,11 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
 #include "filigree/physics/material.h"
-#include "filigree/scene/scene_keys.h"
 #include "filigree/scene/scene_table.h"
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 #include <sstream>
 
 #include <fmt/format.h>
@@ -105,36 +103,21 @@ public:
 
     SceneFile read() {
         check_tables();
-        if (const toml::table* table = single("simulation")) read_simulation({scene_.path, "simulation", *table});
-        if (const toml::table* table = single("world")) read_world({scene_.path, "world", *table});
-        if (const toml::table* table = single("picture")) read_picture({scene_.path, "picture", *table});
-        each("body", [&](const SceneTable& section) { read_body(section); });
+        single("simulation", [&](const SceneTable& in) { read_simulation(in); });
+        single("world", [&](const SceneTable& in) { read_world(in); });
+        single("picture", [&](const SceneTable& in) { read_picture(in); });
+        each("body", [&](const SceneTable& in) { read_body(in); });
         if (scene_.bodies.empty())
             throw BadResultAccess({ErrorCode::bad_file, scene_.path + ": there is no [[body]], and a scene needs one "
                                                                       "(docs/scenes.md)."});
-        each("obstacle", [&](const SceneTable& section) { read_obstacle(section); });
-        each("fracture", [&](const SceneTable& section) { read_fracture(section); });
-        each("crack", [&](const SceneTable& section) { read_crack(section); });
-        each("pin", [&](const SceneTable& section) {
-            for (const std::size_t body : bodies_of(section)) {
-                scene_.pins.push_back({section.line(), body, section.region(), section.motion()});
-                if (scene_.bodies[body].material.model == MaterialModel::rigid)
-                    section.fail(section.line(),
-                                 "a rigid body has no part that could be held; make it an [[obstacle]]");
-            }
-        });
-        each("force", [&](const SceneTable& section) {
-            for (const std::size_t body : bodies_of(section))
-                scene_.forces.push_back({section.line(), body, section.region(), section.keyed("newtons")});
-        });
-        each("heat", [&](const SceneTable& section) {
-            HeatSource source{{.radius = 0.1}, section.keyed("move"), section.keyed_number("power", 0)};
-            section.set("centre", source.ball.centre);
-            section.set("radius", source.ball.radius);
-            scene_.heat_sources.push_back(std::move(source));
-        });
-        each("pair", [&](const SceneTable& section) { read_pair(section); });
-        each("hand", [&](const SceneTable& section) { read_hand(section); });
+        each("obstacle", [&](const SceneTable& in) { read_obstacle(in); });
+        each("fracture", [&](const SceneTable& in) { read_fractures(in); });
+        each("crack", [&](const SceneTable& in) { read_crack(in); });
+        each("pin", [&](const SceneTable& in) { read_pins(in); });
+        each("force", [&](const SceneTable& in) { read_forces(in); });
+        each("heat", [&](const SceneTable& in) { in.read(&scene_.world.heat_sources.emplace_back()); });
+        each("pair", [&](const SceneTable& in) { read_pair(in); });
+        each("hand", [&](const SceneTable& in) { read_hand(in); });
         scene_.content = spelled();
         return std::move(scene_);
     }
@@ -154,8 +137,8 @@ private:
 
     void check_tables() const {
         std::vector<std::string_view> tables;
-        for (const KeyRule& rule : scene_keys())
-            if (tables.empty() || tables.back() != rule.table) tables.push_back(rule.table);
+        for (const SceneKey& key : scene_keys())
+            if (tables.empty() || tables.back() != key.table) tables.push_back(key.table);
         for (const auto& [key, value] : root_) {
             if (std::find(tables.begin(), tables.end(), key.str()) == tables.end()) {
                 const std::string alike = most_alike(key.str(), tables);
@@ -170,9 +153,9 @@ private:
                         fmt::format("'{}' must be written as a table {}", key.str(), shown_table(key.str())));
         }
     }
-    const toml::table* single(std::string_view name) const {
-        const toml::node* node = root_.get(name);
-        return node ? node->as_table() : nullptr;
+    template <class Read>
+    void single(std::string_view name, const Read& read) const {
+        if (const toml::node* node = root_.get(name)) read(SceneTable(scene_.path, name, *node->as_table()));
     }
     template <class Read>
     void each(std::string_view name, const Read& read) const {
@@ -182,74 +165,43 @@ private:
     }
 
     void read_simulation(const SceneTable& in) {
-        if (in.has("frames") && in.has("duration")) in.fail("duration", "give one of frames and duration");
-        StepOptions& step = scene_.step;
-        in.set("frames_per_second", step.frames_per_second);
-        in.set_whole("frames", scene_.frames);
-        if (in.has("duration")) {
-            const double frames = std::round(in.number("duration", 0) * step.frames_per_second);
-            const double most = find_key("simulation", "frames")->most;
-            if (frames > most)
-                in.fail("duration", fmt::format("the duration takes {:.0f} frames at {} a second, and {:.0f} are the "
-                                                "most; shorten it or lower frames_per_second",
-                                                frames, step.frames_per_second, most));
-            scene_.frames = static_cast<std::size_t>(std::max(frames, 1.0));
-        }
-        step.mode = static_cast<StepMode>(in.word("mode", 0));
-        in.set_whole("most_substeps", step.most_substeps);
-        step.contacts_between_bodies = in.flag("contacts_between_bodies", true);
-        step.contacts_within_bodies = in.flag("contacts_within_bodies", true);
-        step.automatic_rigid = in.flag("automatic_rigid", true);
+        in.refuse_both("frames", "duration");
+        in.read(&scene_);
+        if (!scene_.duration) return;
+        const double frames = std::round(*scene_.duration * scene_.step.frames_per_second);
+        const double most = find_key("simulation", "frames")->values.most;
+        if (frames > most)
+            in.fail("duration", fmt::format("the duration takes {:.0f} frames at {} a second, and {:.0f} are the "
+                                            "most; shorten it or lower frames_per_second",
+                                            frames, scene_.step.frames_per_second, most));
+        scene_.frames = static_cast<std::size_t>(std::max(frames, 1.0));
     }
 
     void read_world(const SceneTable& in) {
-        in.set("gravity", scene_.gravity);
-        scene_.wind = in.keyed("wind");
         constexpr double kAir = 1.2; // kg/m^3, at 20 degrees Celsius
-        scene_.air_density = in.number("air_density", in.has("wind") ? kAir : 0);
-        in.set("body_friction", scene_.body_friction);
-        in.set("body_restitution", scene_.body_restitution);
-        scene_.air_temperature = in.keyed_number("air_temperature", scene_.air_temperature.constant);
-        in.set("air_heat_transfer", scene_.air_heat_transfer);
-        in.set("heat_pace", scene_.heat_pace);
+        if (in.has("wind")) scene_.world.air_density = kAir;
+        in.read(&scene_);
     }
 
     void read_body(const SceneTable& in) {
         SceneBody body;
         body.line = in.line();
-        body.shape = in.text("shape");
-        if (in.has("mesh") == in.has("shape")) in.fail(in.line(), "[[body]] takes one of mesh and shape");
-        in.word("shape", 0);
-        in.refuse_others(in.has("shape") ? "shape" : "mesh");
-        if (in.has("mesh")) body.mesh = in.file("mesh");
-        in.set_whole("resolution", body.shape_options.resolution);
-        in.set("frequency", body.shape_options.frequency);
-        in.set("amplitude", body.shape_options.amplitude);
+        if (in.has("mesh") == in.has("shape")) in.fail("[[body]] takes one of mesh and shape");
+        in.refuse_other_shapes(in.has("shape") ? "shape" : "mesh");
+        if (in.has("mesh")) in.refuse_both("size", "scale");
+        in.refuse_both("particles", "spacing");
+        body.material = begun_material(in, body);
+        in.read(&body);
+        check_material_of(in, body.material);
         if (in.has("shape"))
-            in.set("size", body.shape_options.size);
-        else if (in.has("size"))
-            in.set("size", body.body.size.emplace());
-        if (body.body.size && in.has("scale")) in.fail("size", "give one of size and scale");
-        in.set("length", body.shape_options.length);
-        in.set("thickness", body.shape_options.thickness);
-        if (in.has("driver")) in.set_whole("driver", body.driver.emplace());
-        in.set("scale", body.body.scale);
-        if (in.has("particles") && in.has("spacing")) in.fail("spacing", "give one of particles and spacing");
-        in.set_whole("particles", body.body.cells.count);
-        in.set("spacing", body.body.cells.spacing);
-        body.material_name = read_material(in, body.material);
-        in.set("centre", body.centre);
-        body.rotation = in.rotation("rotate");
-        in.set("velocity", body.velocity);
-        in.set("spin", body.spin);
-        body.spin *= kDegree;
-        in.set("color", body.color);
-        body.may_sleep = in.flag("may_sleep", true);
+            body.shape_options.size = body.size.value_or(body.shape_options.size);
+        else
+            body.body.size = body.size;
         body.name = name_of(in, body);
-        if (!in.has("repeat")) return scene_.bodies.push_back(std::move(body));
-        const SceneRepeat repeat = in.repeat("repeat");
+        if (!body.repeat) return scene_.bodies.push_back(std::move(body));
         body.group = body.name;
-        for (std::size_t k = 0; k < repeat.bodies(); ++k) scene_.bodies.push_back(repeated(body, repeat, k));
+        for (std::size_t k = 0; k < body.repeat->bodies(); ++k)
+            scene_.bodies.push_back(repeated(body, *body.repeat, k));
     }
 
     std::string name_of(const SceneTable& in, const SceneBody& body) const {
@@ -257,8 +209,7 @@ private:
             return std::any_of(scene_.bodies.begin(), scene_.bodies.end(),
                                [&](const SceneBody& other) { return other.name == name || other.group == name; });
         };
-        if (in.has("name")) {
-            const std::string name = in.text("name");
+        if (const std::string& name = body.name; !name.empty()) {
             if (name != plain_name(name)) in.fail("name", "a body's name is made of letters, digits, - and _");
             if (is_taken(name)) in.fail("name", "two bodies are called '" + name + "'");
             return name;
@@ -273,125 +224,63 @@ private:
         return *std::ranges::find(named_materials(), name, &NamedMaterial::name);
     }
 
-    /// Refuses keys that do nothing for the body's model.
-    static void refuse_other_models(const SceneTable& in, MaterialModel model) {
-        constexpr std::array kNames = {"fem", "springs", "meshfree", "rigid", "mpm"};
-        const auto refuse = [&](std::string_view key, const char* models) {
-            if (in.has(key))
-                in.fail(key, fmt::format("'{}' in [[body]] is for model = {}, and this body's is \"{}\"", key, models,
-                                         kNames[std::size_t(model)]));
-        };
-        const bool is_mpm = model == MaterialModel::mpm;
-        if (model == MaterialModel::springs || model == MaterialModel::rigid)
-            refuse("yield_stress", "\"fem\", \"meshfree\" or \"mpm\"");
-        if (model != MaterialModel::meshfree && model != MaterialModel::fem)
-            refuse("creep_time", "\"fem\" or \"meshfree\"");
-        if (!is_mpm)
-            for (const char* key : {"temperature", "melting_from", "melting_to", "viscosity", "heating", "conductivity",
-                                    "specific_heat", "latent_heat"})
-                refuse(key, "\"mpm\"");
-        if (is_mpm) refuse("internal_damping", "\"fem\", \"springs\" or \"meshfree\"");
-        if (model != MaterialModel::springs) refuse("bending", "\"springs\"");
-        if (model == MaterialModel::springs) refuse("poisson_ratio", "\"fem\" or \"meshfree\"");
-        if (model == MaterialModel::rigid)
-            for (const char* key : {"young_modulus", "poisson_ratio", "internal_damping"})
-                refuse(key, "\"fem\", \"springs\" or \"meshfree\"");
-    }
-
-    /// Returns the name of the one it began as.
-    static std::string read_material(const SceneTable& in, Material& material) {
+    /// The named material, and the model that the file gives it.
+    static Material begun_material(const SceneTable& in, SceneBody& body) {
+        in.read("material", &body);
         std::vector<std::string_view> names;
         for (const NamedMaterial& named : named_materials()) names.push_back(named.name);
-        const std::string name = in.has("material") ? in.text("material") : std::string(names[0]);
-        const auto found = std::find(names.begin(), names.end(), name);
-        if (found == names.end()) {
-            const std::string alike = most_alike(name, names);
-            in.fail("material", fmt::format("there is no material '{}'{}; there are {}", name,
+        if (std::ranges::find(names, body.material_name) == names.end()) {
+            const std::string alike = most_alike(body.material_name, names);
+            in.fail("material", fmt::format("there is no material '{}'{}; there are {}", body.material_name,
                                             alike.empty() ? "" : " ('" + alike + "'?)", fmt::join(names, ", ")));
         }
-        material = named_materials()[std::size_t(found - names.begin())].material;
-        material.model = static_cast<MaterialModel>(in.word("model", static_cast<int>(material.model)));
-        refuse_other_models(in, material.model);
-        const MaterialModel model = material.model; // as another, a material that yields or melts does not
+        body.material = material_called(body.material_name).material;
+        in.read("model", &body);
+        in.refuse_other_models(body.material.model);
+        Material material = body.material; // as another model, a material that yields or melts does not
+        const MaterialModel model = material.model;
         if (model != MaterialModel::mpm) material.melting_from = material.melting_to = Material::kNever;
         if (model == MaterialModel::springs || model == MaterialModel::rigid) material.yield_stress = Material::kNever;
-        in.set("density", material.density);
-        in.set("young_modulus", material.young_modulus);
-        in.set("poisson_ratio", material.poisson_ratio);
-        in.set("damping", material.damping);
-        in.set("internal_damping", material.internal_damping);
-        in.set("bending", material.bending);
-        in.set("yield_stress", material.yield_stress);
-        in.set("creep_time", material.creep_time);
-        in.set("temperature", material.temperature);
-        in.set("melting_from", material.melting_from);
-        in.set("melting_to", material.melting_to);
-        in.set("viscosity", material.viscosity);
-        in.set("heating", material.heating);
-        in.set("conductivity", material.conductivity);
-        in.set("specific_heat", material.specific_heat);
-        in.set("latent_heat", material.latent_heat);
-        if (std::string wrong = check_material(material); !wrong.empty()) {
-            while (wrong.back() == '.') wrong.pop_back();
-            in.fail(in.line(), wrong);
-        }
-        return name;
+        return material;
+    }
+
+    static void check_material_of(const SceneTable& in, const Material& material) {
+        if (const std::string wrong = check_material(material); !wrong.empty()) in.fail(wrong);
     }
 
     void read_obstacle(const SceneTable& in) {
-        SceneObstacle obstacle;
-        obstacle.line = in.line();
-        if (!in.has("shape")) in.fail(in.line(), "[[obstacle]] needs a shape: ground, ball, box or mesh");
-        in.word("shape", 0);
-        obstacle.shape = in.text("shape");
-        in.refuse_others(obstacle.shape);
-        in.set("point", obstacle.ground.point);
-        in.set("normal", obstacle.ground.normal);
-        if (!(obstacle.ground.normal.norm() > 0)) in.fail("normal", "the normal has no length");
-        obstacle.ground.normal.normalize();
-        in.set("centre", obstacle.centre);
-        obstacle.ball.centre = obstacle.box.centre = obstacle.centre.value_or(Vec3d::Zero());
-        in.set("radius", obstacle.ball.radius);
-        in.set("size", obstacle.box.size);
-        if (!(obstacle.box.size.minCoeff() > 0)) in.fail("size", "the sides of a box must be above 0");
-        if (obstacle.shape == "mesh" && !in.has("mesh")) in.fail(in.line(), "an obstacle of shape mesh needs a mesh");
-        if (in.has("mesh")) obstacle.mesh = in.file("mesh");
-        in.set("scale", obstacle.scale);
-        in.set("spacing", obstacle.spacing);
-        obstacle.motion = in.motion();
-        in.set("friction", obstacle.friction);
-        in.set("restitution", obstacle.restitution);
-        obstacle.sets_restitution = in.has("restitution");
-        in.set("stiffness", obstacle.stiffness);
-        obstacle.temperature = in.keyed_number("temperature", obstacle.temperature.constant);
-        in.set("heat_transfer", obstacle.heat_transfer);
-        in.set("color", obstacle.color);
-        obstacle.visible = in.flag("visible", true);
-        scene_.obstacles.push_back(std::move(obstacle));
+        SceneObstacle from;
+        from.line = in.line();
+        if (!in.has("shape")) in.fail("[[obstacle]] needs a shape: ground, ball, box or mesh");
+        in.read(&from);
+        in.refuse_other_shapes(from.shape);
+        if (!(from.ground.normal.norm() > 0)) in.fail("normal", "the normal has no length");
+        from.ground.normal.normalize();
+        from.ball.centre = from.box.centre = from.centre.value_or(Vec3d::Zero());
+        if (!(from.box.size.minCoeff() > 0)) in.fail("size", "the sides of a box must be above 0");
+        if (from.shape == "mesh" && from.mesh.empty()) in.fail("an obstacle of shape mesh needs a mesh");
+        scene_.obstacles.push_back(std::move(from));
     }
 
     /// The bodies that a pin, force or fracture names: one, or all of a repeated one.
-    std::vector<std::size_t> bodies_of(const SceneTable& in) const {
+    std::vector<std::size_t> bodies_of(const SceneTable& in, const std::string& name) const {
         std::vector<std::size_t> found;
-        const std::string name = in.text("body");
-        const bool is_one_group = !in.has("body") && !scene_.bodies.front().group.empty() &&
+        const bool is_one_group = name.empty() && !scene_.bodies.front().group.empty() &&
                                   scene_.bodies.front().group == scene_.bodies.back().group;
         for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
             if (is_one_group || (!name.empty() && scene_.bodies[b].group == name)) found.push_back(b);
-        return found.empty() ? std::vector<std::size_t>{body_of(in)} : found;
+        return found.empty() ? std::vector<std::size_t>{body_of(in, name)} : found;
     }
-    /// The body that a hand or crack names.
-    std::size_t body_of(const SceneTable& in) const {
-        if (!in.has("body")) {
-            if (scene_.bodies.size() > 1)
-                in.fail(in.line(), "there are several bodies; say which with body = \"name\"");
+    /// The body that a hand or crack names; "": the only one.
+    std::size_t body_of(const SceneTable& in, const std::string& name) const {
+        if (name.empty()) {
+            if (scene_.bodies.size() > 1) in.fail("there are several bodies; say which with body = \"name\"");
             return 0;
         }
         std::vector<std::string_view> names;
         for (const SceneBody& body : scene_.bodies)
             if (body.group.empty() || names.empty() || names.back() != body.group)
                 names.push_back(body.group.empty() ? body.name : body.group);
-        const std::string name = in.text("body");
         for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
             if (scene_.bodies[b].name == name) return b;
         if (std::ranges::count(scene_.bodies, name, &SceneBody::group) > 0)
@@ -400,9 +289,8 @@ private:
     }
 
     /// Numbers of the bodies of this name or pattern, of a repeated one, or of this material.
-    std::vector<std::size_t> bodies_called(const SceneTable& in, std::string_view key) const {
-        if (!in.has(key)) in.fail(in.line(), "[[pair]] needs first and second: names of bodies or materials");
-        const std::string name = in.text(key);
+    std::vector<std::size_t> bodies_called(const SceneTable& in, std::string_view key, const std::string& name) const {
+        if (name.empty()) in.fail("[[pair]] needs first and second: names of bodies or materials");
         std::vector<std::size_t> found;
         for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
             if (fits(scene_.bodies[b].name, name) || scene_.bodies[b].group == name) found.push_back(b);
@@ -414,109 +302,100 @@ private:
     }
 
     void read_pair(const SceneTable& in) {
-        PairContact contact{scene_.body_friction, scene_.body_restitution};
-        in.set("friction", contact.friction);
-        in.set("restitution", contact.restitution);
-        scene_.pairs.push_back({bodies_called(in, "first"), bodies_called(in, "second"), contact});
+        ScenePair pair;
+        pair.contact = {scene_.world.body_friction, scene_.world.body_restitution};
+        in.read(&pair);
+        scene_.world.group_pairs.push_back(
+            {bodies_called(in, "first", pair.first), bodies_called(in, "second", pair.second), pair.contact});
     }
 
-    void read_fracture(const SceneTable& in) {
-        for (const std::size_t body : bodies_of(in)) read_fracture(in, body);
+    void read_pins(const SceneTable& in) {
+        in.refuse_two_regions();
+        ScenePin pin;
+        pin.line = in.line();
+        in.read(&pin);
+        for (const std::size_t body : bodies_of(in, pin.named)) {
+            if (scene_.bodies[body].material.model == MaterialModel::rigid)
+                in.fail("a rigid body has no part that could be held; make it an [[obstacle]]");
+            pin.body = body;
+            scene_.pins.push_back(pin);
+        }
     }
-    void read_fracture(const SceneTable& in, std::size_t body) {
+
+    void read_forces(const SceneTable& in) {
+        in.refuse_two_regions();
+        SceneForce force;
+        force.line = in.line();
+        in.read(&force);
+        for (const std::size_t body : bodies_of(in, force.named)) {
+            force.body = body;
+            scene_.forces.push_back(force);
+        }
+    }
+
+    void read_fractures(const SceneTable& in) {
         SceneFracture fracture;
         fracture.line = in.line();
-        fracture.body = body;
-        const NamedMaterial& named = material_called(scene_.bodies[body].material_name);
-        const Material& material = scene_.bodies[fracture.body].material;
-        if (material.model != MaterialModel::fem)
-            in.fail(in.line(),
-                    "only bodies of model = \"fem\" break, and '" + scene_.bodies[fracture.body].name +
-                        "' is of another; give its [[body]] a material that breaks (brittle-stone, glass, plaster), or "
-                        "add model = \"fem\" and young_modulus = 2e7 (stiffer takes longer; with fem, clay dents and "
-                        "tears as well)");
-        for (const SceneFracture& other : scene_.fractures)
-            if (other.body == fracture.body) in.fail(in.line(), "a body has one [[fracture]] at most");
-        in.set_whole("pieces", fracture.pattern.pieces);
-        in.set_whole("clump", fracture.pattern.clump);
-        fracture.pattern.kind = static_cast<FracturePatternKind>(in.word("pattern", 0));
-        fracture.at = in.points("at");
+        in.read(&fracture);
         if (fracture.pattern.kind == FracturePatternKind::radial && fracture.at.size() > 1)
             in.fail("at", "the pattern radial begins at one point");
-        in.set("grain", fracture.pattern.grain);
         if (fracture.pattern.grain && !(fracture.pattern.grain->norm() > 0))
             in.fail("grain", "the grain has no direction");
-        in.set("stretch", fracture.pattern.stretch);
-        in.set("roughness", fracture.pattern.roughness);
-        fracture.material.seed = 1;
-        in.set_whole("seed", fracture.material.seed);
-        fracture.material.strength = material.is_plastic() ? 3 * material.yield_stress : 0.01 * material.young_modulus;
-        if (named.strength > 0) // it breaks at the same strain where another stiffness is given
-            fracture.material.strength = named.strength * material.young_modulus / named.material.young_modulus;
-        if (named.energy > 0) fracture.energy = named.energy;
-        in.set("strength", fracture.material.strength);
-        if (in.has("plastic_opening")) {
-            if (!material.is_plastic())
-                in.fail("plastic_opening", "'plastic_opening' in [[fracture]] is for a body with a yield_stress");
-            in.set("plastic_opening", fracture.material.plastic_opening);
+        for (const std::size_t body : bodies_of(in, fracture.named))
+            scene_.fractures.push_back(of_body(in, fracture, body));
+    }
+    /// What the file says of a fracture, and the rest by the body's material.
+    SceneFracture of_body(const SceneTable& in, SceneFracture fracture, std::size_t number) const {
+        const SceneBody& body = scene_.bodies[number];
+        const Material& material = body.material;
+        fracture.body = number;
+        if (material.model != MaterialModel::fem)
+            in.fail("only bodies of model = \"fem\" break, and '" + body.name +
+                    "' is of another; give its [[body]] a material that breaks (brittle-stone, glass, plaster), or "
+                    "add model = \"fem\" and young_modulus = 2e7 (stiffer takes longer; with fem, clay dents and "
+                    "tears as well)");
+        if (std::ranges::count(scene_.fractures, number, &SceneFracture::body) > 0)
+            in.fail("a body has one [[fracture]] at most");
+        if (in.has("plastic_opening") && !material.is_plastic())
+            in.fail("plastic_opening", "'plastic_opening' in [[fracture]] is for a body with a yield_stress");
+        const NamedMaterial& named = material_called(body.material_name);
+        if (!in.has("strength")) {
+            fracture.material.strength =
+                material.is_plastic() ? 3 * material.yield_stress : 0.01 * material.young_modulus;
+            if (named.strength > 0) // it breaks at the same strain where another stiffness is given
+                fracture.material.strength = named.strength * material.young_modulus / named.material.young_modulus;
         }
-        in.set("scatter", fracture.material.scatter);
-        if (in.has("energy")) in.set("energy", fracture.energy.emplace());
-        fracture.keep_closed = in.flag("keep_closed", false);
-        scene_.fractures.push_back(std::move(fracture));
+        if (!fracture.energy && named.energy > 0) fracture.energy = named.energy;
+        return fracture;
     }
 
     void read_crack(const SceneTable& in) {
+        in.refuse_two_regions();
         SceneCrack crack;
         crack.line = in.line();
-        crack.body = body_of(in);
-        const auto breaks = [&](const SceneFracture& fracture) { return fracture.body == crack.body; };
-        if (std::ranges::none_of(scene_.fractures, breaks)) in.fail(in.line(), "this body has no [[fracture]]");
-        in.set("time", crack.time);
-        if (in.has("pieces")) crack.pieces = in.ids("pieces");
-        crack.region = in.region();
+        in.read(&crack);
+        crack.body = body_of(in, crack.named);
+        if (std::ranges::count(scene_.fractures, crack.body, &SceneFracture::body) == 0)
+            in.fail("this body has no [[fracture]]");
         scene_.cracks.push_back(std::move(crack));
     }
 
     void read_hand(const SceneTable& in) {
         SceneHand hand;
         hand.line = in.line();
-        hand.body = hand.hand.body = body_of(in);
-        if (in.has("point") == in.has("vertex")) in.fail(in.line(), "[[hand]] takes one of point and vertex");
-        in.set("point", hand.point);
-        if (in.has("vertex")) in.set_whole("vertex", hand.vertex.emplace());
-        if (!in.has("target")) in.fail(in.line(), "[[hand]] needs a target: where it pulls to");
-        hand.hand.target = in.keyed("target");
-        in.set("stiffness", hand.hand.stiffness);
-        in.set("from", hand.hand.from);
-        in.set("until", hand.hand.until);
+        in.read(&hand);
+        hand.body = hand.hand.body = body_of(in, hand.named);
+        if (in.has("point") == in.has("vertex")) in.fail("[[hand]] takes one of point and vertex");
+        if (!in.has("target")) in.fail("[[hand]] needs a target: where it pulls to");
         if (!(hand.hand.from < hand.hand.until)) in.fail("until", "a hand lets go after it takes hold");
         scene_.hands.push_back(std::move(hand));
     }
 
     void read_picture(const SceneTable& in) {
-        ScenePicture& picture = scene_.picture;
-        picture.view = static_cast<View>(in.word("view", static_cast<int>(View::iso)));
-        picture.up = static_cast<UpAxis>(in.word("up", static_cast<int>(UpAxis::y)));
-        in.set("eye", picture.eye);
-        in.set("target", picture.target);
-        if (picture.eye.has_value() != picture.target.has_value())
-            in.fail(in.line(), "eye and target of the camera go together");
+        in.read(&scene_);
+        const ScenePicture& picture = scene_.picture;
+        if (picture.eye.has_value() != picture.target.has_value()) in.fail("eye and target of the camera go together");
         if (picture.eye && *picture.eye == *picture.target) in.fail("eye", "eye and target are the same point");
-        in.set("field_of_view", picture.field_of_view);
-        if (in.has("size")) std::tie(picture.width, picture.height) = in.pixels("size");
-        if (in.has("background")) {
-            const std::string colors = in.text("background");
-            const std::size_t comma = colors.find(',');
-            picture.background_top = in.color("background", colors.substr(0, comma));
-            picture.background_bottom =
-                comma == std::string::npos ? picture.background_top : in.color("background", colors.substr(comma + 1));
-        }
-        picture.ground = in.flag("ground", true);
-        picture.obstacles = in.flag("obstacles", true);
-        picture.particles = in.flag("particles", false);
-        in.set_whole("passes", picture.passes);
-        in.set_whole("most_triangles", picture.most_triangles);
     }
 
     /// The scene without its comments, its pictures and its length, always in one order.

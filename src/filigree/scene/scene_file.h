@@ -1,5 +1,5 @@
-// Scenes described in a TOML file. docs/scenes.md lists every key, from the table that the reader goes by
-// (scene_keys.h).
+// Scenes described in a TOML file: the structs of physics, with what a file names by words. scene_keys.h has the keys,
+// each with the member that it fills.
 #pragma once
 
 #include "filigree/core/view.h"
@@ -23,12 +23,6 @@ struct SceneRegion {
     std::vector<Index> vertices;
 };
 
-struct SceneMotion {
-    Keyed<Vec3d> move{{}, {}, Vec3d::Zero()}, angle{{}, {}, Vec3d::Zero()}; ///< m; axis times radians
-    std::optional<Vec3d> pivot = {};                                        ///< unset: the middle of what moves
-    bool moves() const { return !move.times.empty() || !angle.times.empty(); }
-};
-
 /// Many bodies for one [[body]].
 struct SceneRepeat {
     std::array<unsigned, 3> count = {1, 1, 1}; ///< along x, y and z; along `step` where it is one number
@@ -48,14 +42,16 @@ struct SceneBody {
     std::string mesh;  ///< file, as found from here; or
     std::string shape;
     ShapeOptions shape_options;
+    std::optional<double> size = {}; ///< of the shape (model units) or of the mesh (m), as in the options of each
     std::optional<std::size_t> driver = {}; ///< vertices; unset: as fine as the particles, see body_driver_options
     BodyOptions body;                       ///< with the scale, metres a model unit, or the size
+    std::string material_name = "rubber";   ///< the named material that `material` began as
     Material material;
-    std::string material_name;        ///< that it began as
     std::optional<Vec3d> centre = {}; ///< m; unset: where the mesh's own coordinates say
     Vec3d aside = Vec3d::Zero();      ///< m: from there, of a repeated one
     Eigen::AngleAxisd rotation = Eigen::AngleAxisd::Identity();
     Vec3d velocity = Vec3d::Zero(), spin = Vec3d::Zero(); ///< m/s, rad/s
+    std::optional<SceneRepeat> repeat = {};
     bool may_sleep = true;
     std::optional<Vec3f> color = {};
 };
@@ -68,29 +64,34 @@ struct SceneObstacle {
     Cuboid box;
     std::string mesh; ///< file
     double scale = 1, spacing = 0;
-    std::optional<Vec3d> centre = {}; ///< of a mesh
-    SceneMotion motion;
-    double friction = 0.5, restitution = 0.5, stiffness = 1;
-    bool sets_restitution = false; ///< in the file
-    Keyed<double> temperature{{}, {}, 293};
-    double heat_transfer = 0;
+    std::optional<Vec3d> centre = {};
+    std::optional<Vec3d> pivot = {}; ///< unset: the middle of what moves
+    Obstacle obstacle;               ///< without its shape, and the centre of its motion
     std::optional<Vec3f> color = {};
     bool visible = true;
 };
 
+/// How bodies touch: those called `first` each of those called `second`.
+struct ScenePair {
+    std::string first, second;
+    PairContact contact;
+};
+
 struct SceneFracture {
     unsigned line = 0;
+    std::string named; ///< the body, in the file; "": there is only one
     std::size_t body = 0;
     FracturePattern pattern; ///< without points
     std::vector<Vec3d> at;   ///< world, at the start
-    FractureMaterial material;
+    FractureMaterial material = {.seed = 1};
     std::optional<double> energy = {}; ///< J/m^2; unset: by the strength
     bool keep_closed = false;          ///< also write inner faces of cracks that never opened
 };
 
-/// Something that lets go at a time.
+/// Pieces that let go of each other at a time.
 struct SceneCrack {
     unsigned line = 0;
+    std::string named;
     std::size_t body = 0;
     double time = 0; ///< s
     std::vector<Index> pieces;
@@ -99,13 +100,16 @@ struct SceneCrack {
 
 struct ScenePin {
     unsigned line = 0;
+    std::string named;
     std::size_t body = 0;
     SceneRegion region;
-    SceneMotion motion;
+    RigidMotion motion;              ///< without its centre
+    std::optional<Vec3d> pivot = {}; ///< unset: the middle of what moves
 };
 
 struct SceneForce {
     unsigned line = 0;
+    std::string named;
     std::size_t body = 0;
     SceneRegion region;
     Keyed<Vec3d> newtons{{}, {}, Vec3d::Zero()};
@@ -113,10 +117,15 @@ struct SceneForce {
 
 struct SceneHand {
     unsigned line = 0;
+    std::string named;
     std::size_t body = 0;
     std::optional<Vec3d> point = {}; ///< world, at the start; or
     std::optional<Index> vertex = {};
     Hand hand; ///< without the point
+};
+
+struct SceneBackground {
+    std::optional<Vec3f> top = {}, bottom = {};
 };
 
 struct ScenePicture {
@@ -124,8 +133,9 @@ struct ScenePicture {
     UpAxis up = UpAxis::y;
     std::optional<Vec3d> eye = {}, target = {};
     double field_of_view = 30;
-    unsigned width = 960, height = 720, passes = 8;
-    std::optional<Vec3f> background_top = {}, background_bottom = {};
+    std::array<unsigned, 2> size = {960, 720}; ///< width and height, pixels
+    unsigned passes = 8;
+    SceneBackground background;
     bool ground = true, obstacles = true, particles = false;
     std::size_t most_triangles = 300'000; ///< of a body as it is drawn
 };
@@ -134,16 +144,11 @@ struct SceneFile {
     std::string path;
     std::string content; ///< all that the motion depends on but the meshes, spelled in one way
     std::size_t frames = 120;
+    std::optional<double> duration = {}; ///< s: where the file has it, in place of `frames`, which follow from it
     StepOptions step;
-    Vec3d gravity = {0, -9.81, 0};
-    Keyed<Vec3d> wind{{}, {}, Vec3d::Zero()};
-    double air_density = 0, body_friction = 0.3, body_restitution = 0.7;
-    Keyed<double> air_temperature{{}, {}, 293};
-    double air_heat_transfer = 0, heat_pace = 1;
-    std::vector<HeatSource> heat_sources; ///< world
+    World world; ///< air, heat and how bodies touch; without what follows
     std::vector<SceneBody> bodies;
     std::vector<SceneObstacle> obstacles;
-    std::vector<GroupPair> pairs;
     std::vector<SceneFracture> fractures;
     std::vector<SceneCrack> cracks;
     std::vector<ScenePin> pins;

@@ -1,226 +1,315 @@
 #include "filigree/scene/scene_keys.h"
 
-#include "filigree/physics/material.h"
-
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
 #include <vector>
-
-#include <fmt/format.h>
 
 namespace filigree {
 
 namespace {
 
-constexpr double kAny = std::numeric_limits<double>::infinity();
+constexpr KeyValues kAnything = {};
+constexpr KeyValues kFile = {.is_file = true};
+constexpr KeyValues from(double least, double most) { return {.least = least, .most = most}; }
+constexpr KeyValues above(double least, double most) { return {.least = least, .most = most, .above = true}; }
+constexpr KeyValues one_of(std::string_view words) { return {.words = words}; }
+constexpr KeyUse shapes(std::string_view words) { return {.shapes = words}; }
+constexpr KeyUse models(std::string_view words) { return {.models = words}; }
 
-using enum KeyType;
+template <class Owner, class T>
+Owner owner_of(T Owner::*);
 
-constexpr KeyRule plain(std::string_view table, std::string_view key, KeyType type, std::string_view unit,
-                        std::string_view unset, std::string_view text, std::string_view only = "") {
-    return {table, key, type, unit, unset, -kAny, kAny, false, "", only, text};
+/// Down from the owner of the table by one member after the other.
+template <auto First, auto... Rest>
+KeyPlace place_in(SceneOwner owner) {
+    return &((std::get<decltype(owner_of(First))*>(owner)->*First).*....*Rest);
 }
-constexpr KeyRule from(double least, double most, std::string_view table, std::string_view key, KeyType type,
-                       std::string_view unit, std::string_view unset, std::string_view text,
-                       std::string_view only = "") {
-    return {table, key, type, unit, unset, least, most, false, "", only, text};
+template <auto First, auto... Rest>
+KeyPlace place_in_fresh() {
+    static decltype(owner_of(First)) fresh;
+    return place_in<First, Rest...>(&fresh);
 }
-constexpr KeyRule above(double least, double most, std::string_view table, std::string_view key, KeyType type,
-                        std::string_view unit, std::string_view unset, std::string_view text,
-                        std::string_view only = "") {
-    return {table, key, type, unit, unset, least, most, true, "", only, text};
-}
-constexpr KeyRule one_of(std::string_view words, std::string_view table, std::string_view key, std::string_view unset,
-                         std::string_view text) {
-    return {table, key, word, "", unset, -kAny, kAny, false, words, "", text};
+template <auto... Members>
+constexpr SceneKey key(std::string_view table, std::string_view name, std::string_view unit, KeyValues values,
+                       std::string_view text, std::string_view unset = "", KeyUse use = {}) {
+    return {table, name, &place_in<Members...>, &place_in_fresh<Members...>, unit, values, text, unset, use};
 }
 
-constexpr KeyRule kKeys[] = {
-    from(1, 1e6, "simulation", "frames", whole, "", "120", "frames to compute; the start is one more in the output"),
-    above(0, 1e6, "simulation", "duration", number, "s", "", "or how long to compute"),
-    from(10, 1e4, "simulation", "frames_per_second", number, "1/s", "60", "of the output"),
-    one_of("auto explicit", "simulation", "mode", "auto",
-           "auto: bodies that are too stiff for most_substeps become rigid; explicit: they stay elastic"),
-    from(1, 1e5, "simulation", "most_substeps", whole, "", "500", "a frame, that a body may need to stay elastic"),
-    plain("simulation", "contacts_between_bodies", flag, "", "true", "whether bodies touch each other"),
-    plain("simulation", "contacts_within_bodies", flag, "", "true", "whether a body touches itself"),
-    plain("simulation", "automatic_rigid", flag, "", "true",
-          "whether bodies of fewer than 8 cells, or that need more than most_substeps, become rigid"),
+constexpr std::string_view kByMaterial = "by the material";
 
-    plain("world", "gravity", vector, "m/s^2", "[0, -9.81, 0]", "acceleration of everything"),
-    plain("world", "wind", keyed, "m/s", "[0, 0, 0]", "velocity of the air"),
-    from(0, 1e4, "world", "air_density", number, "kg/m^3", "1.2 with wind, else 0", "how hard the air presses"),
-    from(0, 100, "world", "body_friction", number, "", "0.3", "Coulomb's coefficient between bodies"),
-    from(0, 1, "world", "body_restitution", number, "", "0.7", "between bodies, as that of obstacles"),
+const SceneKey kKeys[] = {
+    key<&SceneFile::frames>("simulation", "frames", "", from(1, 1e6),
+                            "frames to compute; the start is one more in the output"),
+    key<&SceneFile::duration>("simulation", "duration", "s", above(0, 1e6), "or how long to compute"),
+    key<&SceneFile::step, &StepOptions::frames_per_second>("simulation", "frames_per_second", "1/s", from(10, 1e4),
+                                                           "of the output"),
+    key<&SceneFile::step, &StepOptions::mode>(
+        "simulation", "mode", "", one_of("auto explicit"),
+        "auto: bodies that are too stiff for most_substeps become rigid; explicit: they stay elastic"),
+    key<&SceneFile::step, &StepOptions::most_substeps>(
+        "simulation", "most_substeps", "", from(1, 1e5),
+        "substeps a frame; with mode auto, a body that needs more becomes rigid"),
+    key<&SceneFile::step, &StepOptions::contacts_between_bodies>("simulation", "contacts_between_bodies", "", kAnything,
+                                                                 "whether bodies touch each other"),
+    key<&SceneFile::step, &StepOptions::contacts_within_bodies>("simulation", "contacts_within_bodies", "", kAnything,
+                                                                "whether a body touches itself"),
+    key<&SceneFile::step, &StepOptions::automatic_rigid>(
+        "simulation", "automatic_rigid", "", kAnything,
+        "whether bodies of fewer than 8 cells, or that need more than most_substeps, become rigid"),
 
-    above(0, 1e5, "world", "air_temperature", keyed_number, "K", "293", "around bodies of mpm"),
-    from(0, 1e9, "world", "air_heat_transfer", number, "W/(m^2 K)", "0",
-         "how well the air warms and cools them; still air 10"),
-    above(0, 1e9, "world", "heat_pace", number, "", "1",
-          "how many times quicker than in truth heat goes, in and around them"),
+    key<&SceneFile::world, &World::gravity>("world", "gravity", "m/s^2", kAnything, "acceleration of everything"),
+    key<&SceneFile::world, &World::wind>("world", "wind", "m/s", kAnything, "velocity of the air"),
+    key<&SceneFile::world, &World::air_density>("world", "air_density", "kg/m^3", from(0, 1e4),
+                                                "how hard the air presses", "1.2 with wind, else 0"),
+    key<&SceneFile::world, &World::body_friction>("world", "body_friction", "", from(0, 100),
+                                                  "Coulomb's coefficient between bodies"),
+    key<&SceneFile::world, &World::body_restitution>("world", "body_restitution", "", from(0, 1),
+                                                     "between bodies, as that of obstacles"),
+    key<&SceneFile::world, &World::air_temperature>("world", "air_temperature", "K", above(0, 1e5),
+                                                    "around bodies of mpm"),
+    key<&SceneFile::world, &World::air_heat_transfer>("world", "air_heat_transfer", "W/(m^2 K)", from(0, 1e9),
+                                                      "how well the air warms and cools them; still air 10"),
+    key<&SceneFile::world, &World::heat_pace>("world", "heat_pace", "", above(0, 1e9),
+                                              "how many times quicker than in truth heat goes, in and around them"),
 
-    plain("body", "name", text, "", "that of the mesh or shape",
-          "of files, and for pins, forces and hands; letters, digits, - and _"),
-    plain("body", "mesh", text, "", "", "file of a mesh or model (.fil), seen from the scene's folder; or"),
-    one_of("wavy-cube wavy-sphere wavy-plane wavy-plate bar cylinder torus", "body", "shape", "",
-           "a built-in shape, as `filigree make` has them; one of `mesh` and `shape` must be there"),
-    from(1, 8192, "body", "resolution", whole, "", "64", "quads along a side", "shape"),
-    from(0, 1e6, "body", "frequency", number, "", "5", "waves along a side", "shape"),
-    from(0, 10, "body", "amplitude", number, "sides", "0.04", "height of the waves", "shape"),
-    from(1e-30, 1e30, "body", "size", number, "m", "1 of a shape",
-         "longest side of a mesh, in place of `scale`; of a shape its side or diameter, in model units"),
-    from(1e-3, 1e6, "body", "length", number, "sides", "4", "of bars and cylinders", "shape"),
-    from(1e-6, 1, "body", "thickness", number, "ring radii; sides", "0.3", "of a torus: radius of its tube; of a plate",
-         "shape"),
-    from(3, 1e8, "body", "driver", whole, "vertices", "by the spacing",
-         "of the driver that the particles move, whose edges are else 0.8 spacings on average; a model has its own"),
-    above(0, 1e9, "body", "scale", number, "m a model unit", "1", "how large the body is"),
-    from(8, 1e8, "body", "particles", whole, "", "8000", "about so many"),
-    above(0, 1e6, "body", "spacing", number, "m", "", "instead of `particles`: from one to the next"),
-    plain("body", "material", text, "", "rubber", "one of the materials below; the keys from `model` on change it"),
-    one_of("fem springs meshfree rigid mpm", "body", "model", "by the material",
-           "finite elements, springs, or mesh-free; rigid does not deform; mpm melts, parts and joins"),
-    from(1e-9, 1e6, "body", "density", number, "kg/m^3", "by the material", "mass by volume"),
-    from(1e-9, 1e12, "body", "young_modulus", number, "Pa", "by the material", "stiffness"),
-    from(0, 0.49, "body", "poisson_ratio", number, "", "by the material",
-         "how much it thins when pulled; springs have 1/4"),
-    from(0, 1e6, "body", "damping", number, "1/s", "by the material",
-         "decay rate d: e^-d of the speed is left after a second"),
-    from(0, 1e3, "body", "internal_damping", number, "s", "by the material",
-         "stress by the rate of strain, as a multiple of stiffness"),
-    from(0, 0.2, "body", "bending", number, "", "by the material", "springs: share of bending springs"),
-    above(0, 1e12, "body", "yield_stress", number, "Pa", "by the material",
-          "fem, mesh-free, mpm: above it the shape changes for good"),
-    from(0, 1e6, "body", "creep_time", number, "s", "by the material", "fem, mesh-free: how slowly; 0 is at once"),
-    above(0, 1e5, "body", "temperature", number, "K", "by the material", "mpm: at the start"),
-    from(0, 1e5, "body", "melting_from", number, "K", "by the material", "mpm: stiff below"),
-    from(0, 1e5, "body", "melting_to", number, "K", "by the material", "mpm: fluid above"),
-    from(0, 1e9, "body", "viscosity", number, "Pa s", "by the material", "mpm: of the melt"),
-    from(-1e6, 1e6, "body", "heating", number, "K/s", "by the material", "mpm: of the surface, from around"),
-    from(0, 1e3, "body", "conductivity", number, "m^2/s", "by the material", "mpm: thermal diffusivity inside"),
-    above(0, 1e6, "body", "specific_heat", number, "J/(kg K)", "by the material", "mpm: solid and fluid"),
-    from(0, 1e9, "body", "latent_heat", number, "J/kg", "by the material",
-         "mpm: that melting takes, and freezing gives back"),
-    plain("body", "centre", vector, "m", "where its coordinates say", "of the body's box at the start"),
-    plain("body", "rotate", rotation, "degrees", "", "about that centre: `{ axis = [0, 1, 0], degrees = 30 }`"),
-    plain("body", "velocity", vector, "m/s", "[0, 0, 0]", "at the start"),
-    plain("body", "spin", vector, "degrees/s", "[0, 0, 0]", "at the start, about its centre of mass: axis times speed"),
-    plain("body", "repeat", repeat, "m, degrees", "",
-          "many of it, `NAME.1` and so on: `{ count = [5, 8, 1], step = [0.3, 0.2, 0] }`, or one count in a row along "
-          "step; `jitter` moves each by up to so far along each axis, `turn` turns it by up to so many degrees about "
-          "any axis, both by `seed`"),
-    plain("body", "may_sleep", flag, "", "true", "rigid: whether it costs nothing while it lies still on something"),
-    plain("body", "color", color, "", "by its number", "in pictures, `\"#rrggbb\"`"),
+    key<&SceneBody::name>("body", "name", "", kAnything,
+                          "of files, and for pins, forces and hands; letters, digits, - and _",
+                          "that of the mesh or shape"),
+    key<&SceneBody::mesh>("body", "mesh", "", kFile,
+                          "file of a mesh or model (.fil), seen from the scene's folder; or"),
+    key<&SceneBody::shape>("body", "shape", "",
+                           one_of("wavy-cube wavy-sphere wavy-plane wavy-plate bar cylinder torus"),
+                           "a built-in shape, as `filigree make` has them; one of `mesh` and `shape` must be there"),
+    key<&SceneBody::shape_options, &ShapeOptions::resolution>("body", "resolution", "", from(1, 8192),
+                                                              "quads along a side", "", shapes("shape")),
+    key<&SceneBody::shape_options, &ShapeOptions::frequency>("body", "frequency", "", from(0, 1e6),
+                                                             "waves along a side", "", shapes("shape")),
+    key<&SceneBody::shape_options, &ShapeOptions::amplitude>("body", "amplitude", "sides", from(0, 10),
+                                                             "height of the waves", "", shapes("shape")),
+    key<&SceneBody::size>(
+        "body", "size", "m", from(1e-30, 1e30),
+        "longest side of a mesh, in place of `scale`; of a shape its side or diameter, in model units", "1 of a shape"),
+    key<&SceneBody::shape_options, &ShapeOptions::length>("body", "length", "sides", from(1e-3, 1e6),
+                                                          "of bars and cylinders", "", shapes("shape")),
+    key<&SceneBody::shape_options, &ShapeOptions::thickness>("body", "thickness", "ring radii; sides", from(1e-6, 1),
+                                                             "of a torus: radius of its tube; of a plate", "",
+                                                             shapes("shape")),
+    key<&SceneBody::driver>("body", "driver", "vertices", from(3, 1e8),
+                            "of the driver that the particles move, whose edges are else 0.8 spacings on average; a "
+                            "model has its own",
+                            "by the spacing"),
+    key<&SceneBody::body, &BodyOptions::scale>("body", "scale", "m a model unit", above(0, 1e9),
+                                               "how large the body is"),
+    key<&SceneBody::body, &BodyOptions::cells, &CellOptions::count>("body", "particles", "", from(8, 1e8),
+                                                                    "about so many"),
+    key<&SceneBody::body, &BodyOptions::cells, &CellOptions::spacing>(
+        "body", "spacing", "m", above(0, 1e6), "in place of `particles`: from one to the next", "by `particles`"),
+    key<&SceneBody::material_name>("body", "material", "", kAnything,
+                                   "one of the materials below; the keys from `model` on change it"),
+    key<&SceneBody::material, &Material::model>(
+        "body", "model", "", one_of("fem springs meshfree rigid mpm"),
+        "finite elements, springs, or mesh-free; rigid does not deform; mpm melts, parts and joins", kByMaterial),
+    key<&SceneBody::material, &Material::density>("body", "density", "kg/m^3", from(1e-9, 1e6), "mass by volume",
+                                                  kByMaterial),
+    key<&SceneBody::material, &Material::young_modulus>("body", "young_modulus", "Pa", from(1e-9, 1e12), "stiffness",
+                                                        kByMaterial, models("fem springs meshfree mpm")),
+    key<&SceneBody::material, &Material::poisson_ratio>("body", "poisson_ratio", "", from(0, 0.49),
+                                                        "how much it thins when pulled; springs have 1/4", kByMaterial,
+                                                        models("fem meshfree mpm")),
+    key<&SceneBody::material, &Material::damping>(
+        "body", "damping", "1/s", from(0, 1e6), "decay rate d: e^-d of the speed is left after a second", kByMaterial),
+    key<&SceneBody::material, &Material::internal_damping>("body", "internal_damping", "s", from(0, 1e3),
+                                                           "stress by the rate of strain, as a multiple of stiffness",
+                                                           kByMaterial, models("fem springs meshfree")),
+    key<&SceneBody::material, &Material::bending>("body", "bending", "", from(0, 0.2), "share of bending springs",
+                                                  kByMaterial, models("springs")),
+    key<&SceneBody::material, &Material::yield_stress>("body", "yield_stress", "Pa", above(0, 1e12),
+                                                       "above it the shape changes for good", kByMaterial,
+                                                       models("fem meshfree mpm")),
+    key<&SceneBody::material, &Material::creep_time>("body", "creep_time", "s", from(0, 1e6),
+                                                     "how slowly the shape changes above yield_stress; 0 is at once",
+                                                     kByMaterial, models("fem meshfree")),
+    key<&SceneBody::material, &Material::temperature>("body", "temperature", "K", above(0, 1e5), "at the start",
+                                                      kByMaterial, models("mpm")),
+    key<&SceneBody::material, &Material::melting_from>("body", "melting_from", "K", from(0, 1e5), "stiff below",
+                                                       kByMaterial, models("mpm")),
+    key<&SceneBody::material, &Material::melting_to>("body", "melting_to", "K", from(0, 1e5), "fluid above",
+                                                     kByMaterial, models("mpm")),
+    key<&SceneBody::material, &Material::viscosity>("body", "viscosity", "Pa s", from(0, 1e9), "of the melt",
+                                                    kByMaterial, models("mpm")),
+    key<&SceneBody::material, &Material::heating>("body", "heating", "K/s", from(-1e6, 1e6),
+                                                  "of the surface, from around", kByMaterial, models("mpm")),
+    key<&SceneBody::material, &Material::conductivity>("body", "conductivity", "m^2/s", from(0, 1e3),
+                                                       "thermal diffusivity inside", kByMaterial, models("mpm")),
+    key<&SceneBody::material, &Material::specific_heat>("body", "specific_heat", "J/(kg K)", above(0, 1e6),
+                                                        "solid and fluid", kByMaterial, models("mpm")),
+    key<&SceneBody::material, &Material::latent_heat>("body", "latent_heat", "J/kg", from(0, 1e9),
+                                                      "that melting takes, and freezing gives back", kByMaterial,
+                                                      models("mpm")),
+    key<&SceneBody::centre>("body", "centre", "m", kAnything, "of the body's box at the start",
+                            "where its coordinates say"),
+    key<&SceneBody::rotation>("body", "rotate", "degrees", kAnything,
+                              "about that centre: `{ axis = [0, 1, 0], degrees = 30 }`"),
+    key<&SceneBody::velocity>("body", "velocity", "m/s", kAnything, "at the start"),
+    key<&SceneBody::spin>("body", "spin", "degrees/s", kAnything,
+                          "at the start, about its centre of mass: axis times speed"),
+    key<&SceneBody::repeat>(
+        "body", "repeat", "m, degrees", kAnything,
+        "many of it, `NAME.1` and so on: `{ count = [5, 8, 1], step = [0.3, 0.2, 0] }`, or one count in a row along "
+        "step; `jitter` moves each by up to so far along each axis, `turn` turns it by up to so many degrees about "
+        "any axis, both by `seed`"),
+    key<&SceneBody::may_sleep>("body", "may_sleep", "", kAnything,
+                               "rigid: whether it costs nothing while it lies still on something"),
+    key<&SceneBody::color>("body", "color", "", kAnything, "in pictures, `\"#rrggbb\"`", "by its number"),
 
-    one_of("ground ball box mesh", "obstacle", "shape", "", "must be there"),
-    plain("obstacle", "point", vector, "m", "[0, 0, 0]", "one on the surface", "ground"),
-    plain("obstacle", "normal", vector, "", "[0, 1, 0]", "away from what is solid, of any length", "ground"),
-    plain("obstacle", "centre", vector, "m", "[0, 0, 0]; a mesh: where its coordinates say",
-          "of the ball, the box, or the mesh's box", "ball box mesh"),
-    above(0, 1e6, "obstacle", "radius", number, "m", "1", "", "ball"),
-    plain("obstacle", "size", vector, "m", "[1, 1, 1]", "along x, y and z, before it turns; above 0", "box"),
-    plain("obstacle", "mesh", text, "", "", "file, seen from the scene's folder", "mesh"),
-    above(0, 1e9, "obstacle", "scale", number, "m a model unit", "1", "", "mesh"),
-    above(0, 1e6, "obstacle", "spacing", number, "m", "1/64 of the longest side",
-          "of the grid that holds its distances", "mesh"),
-    from(0, 100, "obstacle", "friction", number, "", "0.5", "Coulomb's coefficient"),
-    from(0, 1, "obstacle", "restitution", number, "", "0.5",
-         "of hard points: speed after the bounce over that before; a soft body bounces by its own elasticity, use "
-         "`internal_damping` to deaden it"),
-    above(0, 1, "obstacle", "stiffness", number, "", "1", "of the contact; less for ground softer than the bodies"),
-    above(0, 1e5, "obstacle", "temperature", keyed_number, "K", "293", "of what bodies of mpm touch"),
-    from(0, 1e9, "obstacle", "heat_transfer", number, "W/(m^2 K)", "0", "how well it warms and cools them; metal 1000"),
-    plain("obstacle", "move", keyed, "m", "[0, 0, 0]", "from where it is"),
-    plain("obstacle", "turn", keyed, "degrees", "[0, 0, 0]", "axis times angle, before it moves"),
-    plain("obstacle", "pivot", vector, "m", "its centre", "what it turns about"),
-    plain("obstacle", "color", color, "", "grey", "in pictures"),
-    plain("obstacle", "visible", flag, "", "true", "in pictures"),
+    key<&SceneObstacle::shape>("obstacle", "shape", "", one_of("ground ball box mesh"), "must be there"),
+    key<&SceneObstacle::ground, &HalfSpace::point>("obstacle", "point", "m", kAnything, "one on the surface", "",
+                                                   shapes("ground")),
+    key<&SceneObstacle::ground, &HalfSpace::normal>("obstacle", "normal", "", kAnything,
+                                                    "away from what is solid, of any length", "", shapes("ground")),
+    key<&SceneObstacle::centre>("obstacle", "centre", "m", kAnything, "of the ball, the box, or the mesh's box",
+                                "[0, 0, 0]; a mesh: where its coordinates say", shapes("ball box mesh")),
+    key<&SceneObstacle::ball, &Ball::radius>("obstacle", "radius", "m", above(0, 1e6), "", "", shapes("ball")),
+    key<&SceneObstacle::box, &Cuboid::size>("obstacle", "size", "m", kAnything,
+                                            "along x, y and z, before it turns; above 0", "", shapes("box")),
+    key<&SceneObstacle::mesh>("obstacle", "mesh", "", kFile, "file, seen from the scene's folder", "", shapes("mesh")),
+    key<&SceneObstacle::scale>("obstacle", "scale", "m a model unit", above(0, 1e9), "", "", shapes("mesh")),
+    key<&SceneObstacle::spacing>("obstacle", "spacing", "m", above(0, 1e6), "of the grid that holds its distances",
+                                 "1/64 of the longest side", shapes("mesh")),
+    key<&SceneObstacle::obstacle, &Obstacle::friction>("obstacle", "friction", "", from(0, 100),
+                                                       "Coulomb's coefficient"),
+    key<&SceneObstacle::obstacle, &Obstacle::restitution>(
+        "obstacle", "restitution", "", from(0, 1),
+        "of hard points: speed after the bounce over that before; a soft body bounces by its own elasticity, use "
+        "`internal_damping` to deaden it"),
+    key<&SceneObstacle::obstacle, &Obstacle::stiffness>("obstacle", "stiffness", "", above(0, 1),
+                                                        "of the contact; less for ground softer than the bodies"),
+    key<&SceneObstacle::obstacle, &Obstacle::temperature>("obstacle", "temperature", "K", above(0, 1e5),
+                                                          "of what bodies of mpm touch"),
+    key<&SceneObstacle::obstacle, &Obstacle::heat_transfer>("obstacle", "heat_transfer", "W/(m^2 K)", from(0, 1e9),
+                                                            "how well it warms and cools them; metal 1000"),
+    key<&SceneObstacle::obstacle, &Obstacle::motion, &RigidMotion::move>("obstacle", "move", "m", kAnything,
+                                                                         "from where it is"),
+    key<&SceneObstacle::obstacle, &Obstacle::motion, &RigidMotion::angle>("obstacle", "turn", "degrees", kAnything,
+                                                                          "axis times angle, before it moves"),
+    key<&SceneObstacle::pivot>("obstacle", "pivot", "m", kAnything, "what it turns about", "its centre"),
+    key<&SceneObstacle::color>("obstacle", "color", "", kAnything, "in pictures", "grey"),
+    key<&SceneObstacle::visible>("obstacle", "visible", "", kAnything, "in pictures"),
 
-    plain("heat", "centre", vector, "m", "[0, 0, 0]", "of a ball whose matter is warmed, in bodies of mpm"),
-    above(0, 1e6, "heat", "radius", number, "m", "0.1", "of the ball"),
-    plain("heat", "move", keyed, "m", "[0, 0, 0]", "from where it is"),
-    from(-1e12, 1e12, "heat", "power", keyed_number, "W", "0",
-         "that the matter in it takes up, shared out by mass; below 0 it cools"),
+    key<&HeatSource::ball, &Ball::centre>("heat", "centre", "m", kAnything,
+                                          "of a ball whose matter is warmed, in bodies of mpm"),
+    key<&HeatSource::ball, &Ball::radius>("heat", "radius", "m", above(0, 1e6), "of the ball"),
+    key<&HeatSource::move>("heat", "move", "m", kAnything, "from where it is"),
+    key<&HeatSource::power>("heat", "power", "W", from(-1e12, 1e12),
+                            "that the matter in it takes up, shared out by mass; below 0 it cools"),
 
-    plain("pair", "first", text, "", "",
-          "name of a body, of a repeated one, or of a material: all bodies of it; `*` stands for any letters; must be "
-          "there"),
-    plain("pair", "second", text, "", "", "the same of what it touches; of one body with itself, its name again"),
-    from(0, 100, "pair", "friction", number, "", "the world's", "Coulomb's coefficient where these touch"),
-    from(0, 1, "pair", "restitution", number, "", "the world's", "where these touch"),
+    key<&ScenePair::first>("pair", "first", "", kAnything,
+                           "name of a body, of a repeated one, or of a material: all bodies of it; `*` stands for any "
+                           "letters; must be there"),
+    key<&ScenePair::second>("pair", "second", "", kAnything,
+                            "the same of what it touches; of one body with itself, its name again"),
+    key<&ScenePair::contact, &PairContact::friction>("pair", "friction", "", from(0, 100),
+                                                     "Coulomb's coefficient where these touch", "the world's"),
+    key<&ScenePair::contact, &PairContact::restitution>("pair", "restitution", "", from(0, 1), "where these touch",
+                                                        "the world's"),
 
-    plain("fracture", "body", text, "", "the only one",
-          "name of the body that breaks, or of a repeated one; it is of model fem"),
-    from(2, 100'000, "fracture", "pieces", whole, "", "20", "that it may break into"),
-    one_of(
-        "even impact slabs radial grains", "fracture", "pattern", "even",
+    key<&SceneFracture::named>("fracture", "body", "", kAnything,
+                               "name of the body that breaks, or of a repeated one; it is of model fem",
+                               "the only one"),
+    key<&SceneFracture::pattern, &FracturePattern::pieces>("fracture", "pieces", "", from(2, 100'000),
+                                                           "that it may break into"),
+    key<&SceneFracture::pattern, &FracturePattern::kind>(
+        "fracture", "pattern", "", one_of("even impact slabs radial grains"),
         "of about one size; small around a point; long ones, as of wood; rays and rings around a point, as of glass; "
         "small here and large there, as of stone"),
-    from(1, 100, "fracture", "clump", whole, "", "1",
-         "cells that a piece is made of: with more, pieces are knobbly and have hollows"),
-    plain("fracture", "at", points, "m", "a corner; radial: the middle",
-          "where the pattern impact or radial begins, at the start; radial takes one"),
-    plain("fracture", "grain", vector, "", "the longest axis",
-          "slabs: along which they are longer, on the mesh's axes"),
-    from(1, 100, "fracture", "stretch", number, "", "6", "slabs: how many times longer"),
-    from(0, 1, "fracture", "roughness", number, "", "0.5", "of cracks; 0 is planes"),
-    from(0, 1e9, "fracture", "seed", whole, "", "1", "of the pattern and the scatter"),
-    above(0, 1e12, "fracture", "strength", number, "Pa",
-          "by the material, else 0.01 young_modulus; of what yields 3 yield_stress",
-          "the stress at which a crack begins"),
-    above(0, 1e6, "fracture", "plastic_opening", number, "m", "any",
-          "of what yields: how far a layer a cell thick may stretch for good before it tears"),
-    from(0, 1, "fracture", "scatter", number, "", "0", "of the strengths of cracks: their standard deviation, a share"),
-    above(0, 1e12, "fracture", "energy", number, "J/m^2",
-          "by the material, else strength^2 diagonal / (50 young_modulus)", "that a crack costs by its area"),
-    plain("fracture", "keep_closed", flag, "", "false", "also write the inner faces of cracks that never opened"),
+    key<&SceneFracture::pattern, &FracturePattern::clump>(
+        "fracture", "clump", "", from(1, FracturePattern::kMostClump),
+        "cells that a piece is made of: with more, pieces are knobbly and have hollows"),
+    key<&SceneFracture::at>("fracture", "at", "m", kAnything,
+                            "where the pattern impact or radial begins, at the start; radial takes one",
+                            "a corner; radial: the middle"),
+    key<&SceneFracture::pattern, &FracturePattern::grain>("fracture", "grain", "", kAnything,
+                                                          "slabs: along which they are longer, on the mesh's axes",
+                                                          "the longest axis"),
+    key<&SceneFracture::pattern, &FracturePattern::stretch>("fracture", "stretch", "", from(1, 100),
+                                                            "slabs: how many times longer"),
+    key<&SceneFracture::pattern, &FracturePattern::roughness>("fracture", "roughness", "", from(0, 1),
+                                                              "of cracks; 0 is planes"),
+    key<&SceneFracture::material, &FractureMaterial::seed>("fracture", "seed", "", from(0, 1e9),
+                                                           "of the pattern and the scatter"),
+    key<&SceneFracture::material, &FractureMaterial::strength>(
+        "fracture", "strength", "Pa", above(0, 1e12), "the stress at which a crack begins",
+        "by the material, else 0.01 young_modulus; of what yields 3 yield_stress"),
+    key<&SceneFracture::material, &FractureMaterial::plastic_opening>(
+        "fracture", "plastic_opening", "m", above(0, 1e6),
+        "of what yields: how far a layer a cell thick may stretch for good before it tears", "any"),
+    key<&SceneFracture::material, &FractureMaterial::scatter>(
+        "fracture", "scatter", "", from(0, 1), "of the strengths of cracks: their standard deviation, a share"),
+    key<&SceneFracture::energy>("fracture", "energy", "J/m^2", above(0, 1e12), "that a crack costs by its area",
+                                "by the material, else strength^2 diagonal / (50 young_modulus)"),
+    key<&SceneFracture::keep_closed>("fracture", "keep_closed", "", kAnything,
+                                     "also write the inner faces of cracks that never opened"),
 
-    plain("crack", "body", text, "", "the only one", "name of a body with a [[fracture]]"),
-    from(0, 1e9, "crack", "time", number, "s", "0", "when pieces let go of each other, whatever pulls them"),
-    plain("crack", "pieces", ids, "", "any", "of what holds these to others, by number; and"),
-    plain("crack", "box", box, "m", "everywhere", "of what is in a box at the start; or"),
-    plain("crack", "ball", ball, "m", "everywhere", "in a ball; or"),
-    plain("crack", "vertices", ids, "", "everywhere", "near vertices of its mesh"),
+    key<&SceneCrack::named>("crack", "body", "", kAnything, "name of a body with a [[fracture]]", "the only one"),
+    key<&SceneCrack::time>("crack", "time", "s", from(0, 1e9), "when pieces let go of each other, whatever pulls them"),
+    key<&SceneCrack::pieces>("crack", "pieces", "", kAnything, "of what holds these to others, by number; and", "any"),
+    key<&SceneCrack::region, &SceneRegion::box>("crack", "box", "m", kAnything, "of what is in a box at the start; or",
+                                                "everywhere"),
+    key<&SceneCrack::region, &SceneRegion::ball>("crack", "ball", "m", kAnything, "in a ball; or", "everywhere"),
+    key<&SceneCrack::region, &SceneRegion::vertices>("crack", "vertices", "", kAnything, "near vertices of its mesh",
+                                                     "everywhere"),
 
-    plain("pin", "body", text, "", "the only one", "name of the body whose particles are held, or of a repeated one"),
-    plain("pin", "box", box, "m", "", "those in a box at the start: `{ min = [x, y, z], max = [x, y, z] }`; or"),
-    plain("pin", "ball", ball, "m", "", "in a ball: `{ centre = [x, y, z], radius = r }`; or"),
-    plain("pin", "vertices", ids, "", "", "near vertices of its mesh, counted from 0"),
-    plain("pin", "move", keyed, "m", "[0, 0, 0]", "from where they were"),
-    plain("pin", "turn", keyed, "degrees", "[0, 0, 0]", "axis times angle, before they move"),
-    plain("pin", "pivot", vector, "m", "their middle", "what they turn about"),
+    key<&ScenePin::named>("pin", "body", "", kAnything,
+                          "name of the body whose particles are held, or of a repeated one", "the only one"),
+    key<&ScenePin::region, &SceneRegion::box>(
+        "pin", "box", "m", kAnything, "those in a box at the start: `{ min = [x, y, z], max = [x, y, z] }`; or"),
+    key<&ScenePin::region, &SceneRegion::ball>("pin", "ball", "m", kAnything,
+                                               "in a ball: `{ centre = [x, y, z], radius = r }`; or"),
+    key<&ScenePin::region, &SceneRegion::vertices>("pin", "vertices", "", kAnything,
+                                                   "near vertices of its mesh, counted from 0"),
+    key<&ScenePin::motion, &RigidMotion::move>("pin", "move", "m", kAnything, "from where they were"),
+    key<&ScenePin::motion, &RigidMotion::angle>("pin", "turn", "degrees", kAnything,
+                                                "axis times angle, before they move"),
+    key<&ScenePin::pivot>("pin", "pivot", "m", kAnything, "what they turn about", "their middle"),
 
-    plain("force", "body", text, "", "the only one", "name of the body that is pushed, or of a repeated one"),
-    plain("force", "box", box, "m", "the whole body", "on what is in a box at the start; or"),
-    plain("force", "ball", ball, "m", "the whole body", "in a ball; or"),
-    plain("force", "vertices", ids, "", "the whole body", "near vertices of its mesh"),
-    plain("force", "newtons", keyed, "N", "[0, 0, 0]", "of all of it together"),
+    key<&SceneForce::named>("force", "body", "", kAnything, "name of the body that is pushed, or of a repeated one",
+                            "the only one"),
+    key<&SceneForce::region, &SceneRegion::box>("force", "box", "m", kAnything, "on what is in a box at the start; or",
+                                                "the whole body"),
+    key<&SceneForce::region, &SceneRegion::ball>("force", "ball", "m", kAnything, "in a ball; or", "the whole body"),
+    key<&SceneForce::region, &SceneRegion::vertices>("force", "vertices", "", kAnything, "near vertices of its mesh",
+                                                     "the whole body"),
+    key<&SceneForce::newtons>("force", "newtons", "N", kAnything, "of all of it together"),
 
-    plain("hand", "body", text, "", "the only one", "name of the body that is pulled"),
-    plain("hand", "point", vector, "m", "", "the surface's nearest point to this one at the start; or"),
-    from(0, 4294967294.0, "hand", "vertex", whole, "", "", "a vertex of its mesh"),
-    plain("hand", "target", keyed, "m", "the point", "where the hand is"),
-    from(0, 1e12, "hand", "stiffness", number, "N/m", "0: by the body's",
-         "of the spring between them; at most a quarter of what the body's own would allow"),
-    from(0, 1e9, "hand", "from", number, "s", "0", "when it takes hold"),
-    from(0, 1e9, "hand", "until", number, "s", "to the end", "when it lets go"),
+    key<&SceneHand::named>("hand", "body", "", kAnything, "name of the body that is pulled", "the only one"),
+    key<&SceneHand::point>("hand", "point", "m", kAnything, "the surface's nearest point to this one at the start; or"),
+    key<&SceneHand::vertex>("hand", "vertex", "", from(0, double(kNoIndex) - 1), "a vertex of its mesh"),
+    key<&SceneHand::hand, &Hand::target>("hand", "target", "m", kAnything, "where the hand is", "must be there"),
+    key<&SceneHand::hand, &Hand::stiffness>(
+        "hand", "stiffness", "N/m", from(0, 1e12),
+        "of the spring between them; at most a quarter of what the body's own would allow", "0: by the body's"),
+    key<&SceneHand::hand, &Hand::from>("hand", "from", "s", from(0, 1e9), "when it takes hold"),
+    key<&SceneHand::hand, &Hand::until>("hand", "until", "s", from(0, 1e9), "when it lets go", "to the end"),
 
-    one_of("front side top iso", "picture", "view", "iso", "where from"),
-    one_of("x y z", "picture", "up", "y", "which axis is up"),
-    plain("picture", "eye", vector, "m", "as near as all the motion fits", "where the camera is; with `target`"),
-    plain("picture", "target", vector, "m", "", "what it looks at"),
-    from(0, 150, "picture", "field_of_view", number, "degrees", "30", "vertical; 0 is parallel projection"),
-    from(16, 8192, "picture", "size", pixels, "pixels", "[960, 720]", "width and height"),
-    plain("picture", "background", text, "", "light grey",
-          "`\"#rrggbb\"`, or two from top to bottom: `\"#rrggbb,#rrggbb\"`"),
-    plain("picture", "ground", flag, "", "true", "whether a level ground, or the lowest point, catches the shadow"),
-    plain("picture", "obstacles", flag, "", "true", "whether they are drawn"),
-    plain("picture", "particles", flag, "", "false", "whether particles are drawn in place of the surface"),
-    from(1, 1000, "picture", "passes", whole, "", "8", "light directions that are averaged"),
-    from(1, 1e9, "picture", "most_triangles", whole, "", "300000",
-         "of a body; a larger one is drawn at a coarser level"),
+    key<&SceneFile::picture, &ScenePicture::view>("picture", "view", "", one_of("front side top iso"), "where from"),
+    key<&SceneFile::picture, &ScenePicture::up>("picture", "up", "", one_of("x y z"), "which axis is up"),
+    key<&SceneFile::picture, &ScenePicture::eye>("picture", "eye", "m", kAnything, "where the camera is; with `target`",
+                                                 "as near as all the motion fits"),
+    key<&SceneFile::picture, &ScenePicture::target>("picture", "target", "m", kAnything, "what it looks at"),
+    key<&SceneFile::picture, &ScenePicture::field_of_view>("picture", "field_of_view", "degrees", from(0, 150),
+                                                           "vertical; 0 is parallel projection"),
+    key<&SceneFile::picture, &ScenePicture::size>("picture", "size", "pixels", from(16, 8192), "width and height"),
+    key<&SceneFile::picture, &ScenePicture::background>(
+        "picture", "background", "", kAnything, "`\"#rrggbb\"`, or two from top to bottom: `\"#rrggbb,#rrggbb\"`",
+        "light grey"),
+    key<&SceneFile::picture, &ScenePicture::ground>("picture", "ground", "", kAnything,
+                                                    "whether a level ground, or the lowest point, catches the shadow"),
+    key<&SceneFile::picture, &ScenePicture::obstacles>("picture", "obstacles", "", kAnything, "whether they are drawn"),
+    key<&SceneFile::picture, &ScenePicture::particles>("picture", "particles", "", kAnything,
+                                                       "whether particles are drawn in place of the surface"),
+    key<&SceneFile::picture, &ScenePicture::passes>("picture", "passes", "", from(1, 1000),
+                                                    "light directions that are averaged"),
+    key<&SceneFile::picture, &ScenePicture::most_triangles>("picture", "most_triangles", "", from(1, 1e9),
+                                                            "of a body; a larger one is drawn at a coarser level"),
 };
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
@@ -238,93 +327,26 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
     return row.back();
 }
 
-std::string table_head(std::string_view table) {
-    return fmt::format("\n### `{}`\n\n| key | type | unit | unset | range | |\n|---|---|---|---|---|---|\n",
-                       shown_table(table));
-}
-
-std::string manual_row(const KeyRule& rule) {
-    std::string text(rule.text);
-    if (!rule.only.empty() && rule.table == "obstacle") {
-        std::string shapes;
-        for (const char c : rule.only) shapes += c == ' ' ? std::string(", ") : std::string(1, c);
-        text = shapes + (text.empty() ? "" : ": " + text);
-    }
-    std::string range = range_text(rule);
-    for (std::size_t at = 0; at < rule.words.size();) { // `a`, `b`
-        const std::size_t end = std::min(rule.words.find(' ', at), rule.words.size());
-        range += fmt::format("{}`{}`", range.empty() ? "" : ", ", rule.words.substr(at, end - at));
-        at = end + 1;
-    }
-    return fmt::format("| `{}` | {} | {} | {} | {} | {} |\n", rule.key, type_text(rule.type), rule.unit, rule.unset,
-                       range, text);
-}
-
-std::string or_never(double value) { return std::isinf(value) ? "" : fmt::format("{}", value); }
-
 } // namespace
 
-std::span<const KeyRule> scene_keys() { return kKeys; }
+std::span<const SceneKey> scene_keys() { return kKeys; }
 
-const KeyRule* find_key(std::string_view table, std::string_view key) {
-    for (const KeyRule& rule : kKeys)
-        if (rule.table == table && rule.key == key) return &rule;
+const SceneKey* find_key(std::string_view table, std::string_view name) {
+    for (const SceneKey& key : kKeys)
+        if (key.table == table && key.name == name) return &key;
     return nullptr;
 }
 
 bool is_list(std::string_view table) { return table != "simulation" && table != "world" && table != "picture"; }
 
 std::string shown_table(std::string_view table) {
-    return is_list(table) ? fmt::format("[[{}]]", table) : fmt::format("[{}]", table);
+    return std::string(is_list(table) ? "[[" : "[").append(table).append(is_list(table) ? "]]" : "]");
 }
 
-std::string range_text(const KeyRule& rule) {
-    const bool has_least = !std::isinf(rule.least), has_most = !std::isinf(rule.most);
-    if (rule.above) {
-        return has_most ? fmt::format("above {:g}, to {:g}", rule.least, rule.most)
-                        : fmt::format("above {:g}", rule.least);
-    }
-    if (has_least)
-        return has_most ? fmt::format("{:g} to {:g}", rule.least, rule.most) : fmt::format("{:g} and up", rule.least);
-    return "";
-}
-
-std::string type_text(KeyType type) {
-    switch (type) {
-    case text:
-        return "text";
-    case word:
-        return "word";
-    case number:
-        return "number";
-    case whole:
-        return "whole number";
-    case flag:
-        return "true or false";
-    case vector:
-        return "three numbers";
-    case points:
-        return "three numbers, or a list of such";
-    case keyed:
-        return "three numbers, or keys";
-    case keyed_number:
-        return "number, or keys";
-    case color:
-        return "colour";
-    case box:
-        return "box";
-    case ball:
-        return "ball";
-    case ids:
-        return "list of numbers from 0";
-    case rotation:
-        return "axis and degrees";
-    case repeat:
-        return "table";
-    case pixels:
-        return "two whole numbers";
-    }
-    return "";
+bool has_word(std::string_view words, std::string_view word) {
+    bool found = false;
+    each_word(words, [&](std::string_view each) { found = found || each == word; });
+    return found;
 }
 
 std::string most_alike(std::string_view word, std::span<const std::string_view> words) {
@@ -339,32 +361,6 @@ std::string most_alike(std::string_view word, std::span<const std::string_view> 
         best = known;
     }
     return std::string(best);
-}
-
-std::string scene_manual() {
-    std::string manual;
-    std::string_view table;
-    for (const KeyRule& rule : kKeys) {
-        if (rule.table != table) manual += table_head(rule.table);
-        table = rule.table;
-        manual += manual_row(rule);
-    }
-    manual +=
-        "\n### Materials\n\n| name | model | density | young_modulus | poisson_ratio | damping | internal_damping | "
-        "yield_stress | creep_time | melting_from, melting_to | viscosity | strength, energy | |\n"
-        "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
-    constexpr std::array<std::string_view, 5> kModels = {"fem", "springs", "meshfree", "rigid", "mpm"};
-    for (const NamedMaterial& named : named_materials()) {
-        const Material& m = named.material;
-        manual +=
-            fmt::format("| `{}` | {} | {} | {:.0e} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", named.name,
-                        kModels[std::size_t(m.model)], m.density, m.young_modulus, m.poisson_ratio, m.damping,
-                        m.internal_damping, or_never(m.yield_stress), m.is_plastic() ? or_never(m.creep_time) : "",
-                        m.melts() ? fmt::format("{}, {}", m.melting_from, m.melting_to) : "",
-                        m.melts() ? fmt::format("{}", m.viscosity) : "",
-                        named.strength > 0 ? fmt::format("{:.0e}, {}", named.strength, named.energy) : "", named.text);
-    }
-    return manual.substr(1);
 }
 
 } // namespace filigree

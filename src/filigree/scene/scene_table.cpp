@@ -15,7 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostShown = 4; ///< values of a list
+constexpr double kDegree = std::numbers::pi / 180; // radians
+constexpr std::size_t kMostShown = 4;              ///< values of a list
 
 unsigned line_of(const toml::node& node) { return node.source().begin.line; }
 
@@ -27,8 +28,8 @@ std::string suggestion(std::string_view word, std::span<const std::string_view> 
 
 /// The table that has such a key, as it is written; "" when there is none.
 std::string table_with(std::string_view key) {
-    for (const KeyRule& rule : scene_keys())
-        if (rule.key == key) return shown_table(rule.table);
+    for (const SceneKey& known : scene_keys())
+        if (known.name == key) return shown_table(known.table);
     return "";
 }
 
@@ -53,9 +54,233 @@ std::string shown(const toml::node& node) {
     return "a date or time";
 }
 
-std::string wanted_number(const char* kind, const KeyRule& rule) {
-    const std::string range = range_text(rule);
-    return range.empty() ? kind : fmt::format("{}, {}", kind, range);
+/// The value of a key, into a member by the type of the member.
+class KeyReader {
+public:
+    KeyReader(const std::string& path, const SceneKey& key) : path_(path), key_(key) {}
+
+    /// Numbers and words.
+    template <class T>
+    void set(const toml::node& node, T& value) const {
+        if constexpr (std::is_enum_v<T>)
+            value = static_cast<T>(word_of(node));
+        else
+            value = static_cast<T>(whole_of(node));
+    }
+    template <class T>
+    void set(const toml::node& node, std::optional<T>& value) const {
+        set(node, value.emplace());
+    }
+    void set(const toml::node& node, double& value) const { value = number_of(node); }
+    void set(const toml::node& node, bool& value) const {
+        const auto flag = node.value_exact<bool>();
+        if (!flag) wrong(node, "true or false");
+        value = *flag;
+    }
+    void set(const toml::node& node, std::string& value) const {
+        if (!key_.values.words.empty()) word_of(node);
+        value = key_.values.is_file ? file_of(node) : text_of(node);
+    }
+    void set(const toml::node& node, Vec3d& value) const { value = unit() * vector_of(node, key_.name); }
+    void set(const toml::node& node, Vec3f& value) const { value = color_of(node, text_of(node)); }
+    void set(const toml::node& node, Keyed<double>& value) const {
+        const toml::array* list = node.as_array();
+        if (!list || list->empty()) return set(node, value.constant);
+        set_keys(*list, value, Times::ascend, "a number, or a list of { time = t, value = v }",
+                 [&](const toml::node& entry) { return number_of(entry); });
+    }
+    void set(const toml::node& node, Keyed<Vec3d>& value) const {
+        const toml::array* list = node.as_array();
+        if (!list || list->empty() || !list->get(0)->is_table()) return set(node, value.constant);
+        set_keys(*list, value, Times::may_jump, "three numbers, or a list of { time = t, value = [x, y, z] }",
+                 [&](const toml::node& entry) { return Vec3d(unit() * vector_of(entry, part("value"))); });
+    }
+    void set(const toml::node& node, std::vector<Vec3d>& value) const {
+        const toml::array* list = node.as_array();
+        value.clear();
+        if (!list || list->empty() || !list->get(0)->is_array())
+            value.push_back(vector_of(node, key_.name));
+        else
+            for (const toml::node& entry : *list) value.push_back(vector_of(entry, key_.name));
+    }
+    void set(const toml::node& node, std::vector<Index>& value) const {
+        constexpr const char* kWanted = "a list of whole numbers from 0";
+        const toml::array* list = node.as_array();
+        if (!list || list->empty()) wrong(node, kWanted);
+        value.clear();
+        for (const toml::node& entry : *list) {
+            const auto id = entry.value_exact<std::int64_t>();
+            if (!id || *id < 0 || *id >= std::int64_t{kNoIndex}) wrong(entry, kWanted);
+            value.push_back(static_cast<Index>(*id));
+        }
+    }
+    void set(const toml::node& node, Eigen::AngleAxisd& value) const {
+        const toml::table& table = sub_table(node, {"axis", "degrees"});
+        const Vec3d axis = vector_of(*table.get("axis"), part("axis"));
+        if (!(axis.norm() > 0)) wrong(*table.get("axis"), "a direction with a length", part("axis"));
+        const double degrees = finite_of(*table.get("degrees"), part("degrees"), "a number");
+        value = Eigen::AngleAxisd(kDegree * degrees, axis.normalized());
+    }
+    void set(const toml::node& node, std::array<unsigned, 2>& value) const {
+        const toml::array* list = node.as_array();
+        if (!list || list->size() != 2) wrong(node, "two whole numbers");
+        for (std::size_t k = 0; k < 2; ++k) set(*list->get(k), value[k]);
+    }
+    void set(const toml::node& node, SceneBackground& value) const {
+        const std::string colors = text_of(node);
+        const std::size_t comma = colors.find(',');
+        value.top = value.bottom = color_of(node, colors.substr(0, comma));
+        if (comma != std::string::npos) value.bottom = color_of(node, colors.substr(comma + 1));
+    }
+    void set(const toml::node& node, Box& value) const {
+        const toml::table& table = sub_table(node, {"max", "min"});
+        value = Box{vector_of(*table.get("min"), part("min")), vector_of(*table.get("max"), part("max"))};
+        if (value.empty()) fail(node, "the box's min is not below its max");
+    }
+    void set(const toml::node& node, Ball& value) const {
+        const toml::table& table = sub_table(node, {"centre", "radius"});
+        const toml::node& radius = *table.get("radius");
+        value = Ball{vector_of(*table.get("centre"), part("centre")),
+                     finite_of(radius, part("radius"), "a number above 0")};
+        if (!(value.radius > 0)) wrong(radius, "a number above 0", part("radius"));
+    }
+    void set(const toml::node& node, SceneRepeat& value) const;
+
+private:
+    enum class Times { ascend, may_jump };
+
+    [[noreturn]] void fail(const toml::node& node, const std::string& what) const {
+        fail_at(path_, line_of(node), what);
+    }
+    [[noreturn]] void wrong(const toml::node& node, const std::string& wanted, std::string_view name = "") const {
+        fail(node, fmt::format("'{}' in {} must be {}, and is {}", name.empty() ? key_.name : name,
+                               shown_table(key_.table), wanted, shown(node)));
+    }
+    std::string part(const char* name) const { return fmt::format("{}.{}", key_.name, name); }
+    /// Vectors of degrees are axes times angles, which the structs hold in radians.
+    double unit() const { return key_.unit.starts_with("degrees") ? kDegree : 1; }
+    std::string wanted_number(const char* kind) const {
+        const std::string range = range_text(key_.values);
+        return range.empty() ? kind : fmt::format("{}, {}", kind, range);
+    }
+
+    double finite_of(const toml::node& node, std::string_view name, const std::string& wanted) const {
+        const bool is_number = node.is_integer() || node.is_floating_point();
+        const double value = is_number ? *node.value<double>() : std::nan("");
+        if (!std::isfinite(value)) wrong(node, wanted, name);
+        return value;
+    }
+    double number_of(const toml::node& node) const {
+        const KeyValues& may = key_.values;
+        const std::string wanted = wanted_number("a number");
+        const double value = finite_of(node, key_.name, wanted);
+        if (value < may.least || value > may.most || (may.above && value == may.least)) wrong(node, wanted);
+        return value;
+    }
+    std::int64_t whole_of(const toml::node& node) const {
+        const auto value = node.value_exact<std::int64_t>();
+        if (!value || double(*value) < key_.values.least || double(*value) > key_.values.most)
+            wrong(node, wanted_number("a whole number"));
+        return *value;
+    }
+    std::string text_of(const toml::node& node) const {
+        const auto value = node.value_exact<std::string>();
+        if (!value || value->empty()) wrong(node, "a text");
+        return *value;
+    }
+    /// The place of a word among those of the row.
+    std::size_t word_of(const toml::node& node) const {
+        std::vector<std::string_view> words;
+        each_word(key_.values.words, [&](std::string_view word) { words.push_back(word); });
+        const auto value = node.value_exact<std::string>();
+        const auto found = std::ranges::find(words, value.value_or(""));
+        if (found == words.end()) wrong(node, fmt::format("one of {}", fmt::join(words, ", ")));
+        return static_cast<std::size_t>(found - words.begin());
+    }
+    Vec3d vector_of(const toml::node& node, std::string_view name) const {
+        const toml::array* list = node.as_array();
+        if (!list || list->size() != 3) wrong(node, "three numbers", name);
+        Vec3d value;
+        for (int i = 0; i < 3; ++i) value[i] = finite_of(*list->get(std::size_t(i)), name, "three numbers");
+        return value;
+    }
+    Vec3f color_of(const toml::node& node, const std::string& written) const {
+        const std::optional<Vec3f> color = parse_color(written);
+        if (!color)
+            fail(node, fmt::format("{}: '{}' is no colour; write it as #rrggbb, such as #d04030", key_.name, written));
+        return *color;
+    }
+    /// A file's name, seen from the scene's folder; it has to be there.
+    std::string file_of(const toml::node& node) const {
+        const fs::path named = text_of(node),
+                       path = named.is_absolute() ? named : fs::path(path_).parent_path() / named;
+        std::error_code ignored;
+        if (!fs::exists(path, ignored))
+            fail_at(path_, line_of(node),
+                    fmt::format("there is no file '{}' (looked for {})", named.string(), path.string()),
+                    ErrorCode::not_found);
+        return path.string();
+    }
+    const toml::table& sub_table(const toml::node& node, std::array<std::string_view, 2> keys) const {
+        const toml::table* table = node.as_table();
+        if (!table || table->size() != 2 || !table->contains(keys[0]) || !table->contains(keys[1]))
+            wrong(node, fmt::format("a table with {} and {}", keys[0], keys[1]));
+        return *table;
+    }
+    template <class T, class Read>
+    void set_keys(const toml::array& list, Keyed<T>& value, Times times, const char* wanted, const Read& read) const {
+        value.times.clear();
+        value.values.clear();
+        for (const toml::node& entry : list) {
+            const toml::table* table = entry.as_table();
+            if (!table || table->size() != 2 || !table->contains("time") || !table->contains("value"))
+                wrong(entry, wanted);
+            const double time = finite_of(*table->get("time"), part("time"), "a number");
+            if (!value.times.empty() &&
+                (times == Times::may_jump ? time < value.times.back() : time <= value.times.back()))
+                fail(entry, fmt::format("the times of '{}' in {} must ascend", key_.name, shown_table(key_.table)));
+            value.times.push_back(time);
+            value.values.push_back(read(*table->get("value")));
+        }
+    }
+
+    const std::string& path_;
+    const SceneKey& key_;
+};
+
+void KeyReader::set(const toml::node& node, SceneRepeat& repeat) const {
+    constexpr std::array<std::string_view, 5> kParts = {"count", "step", "jitter", "turn", "seed"};
+    constexpr double kMost = 10'000;
+    const toml::table* table = node.as_table();
+    if (!table || !table->contains("count"))
+        wrong(node, "a table such as { count = [5, 8, 1], step = [0.3, 0.2, 0.3] }");
+    for (const auto& [name, value] : *table)
+        if (std::ranges::find(kParts, name.str()) == kParts.end())
+            fail(node, fmt::format("unknown key '{}' in {}{}", name.str(), key_.name, suggestion(name.str(), kParts)));
+    const auto whole = [&](const toml::node& value, const char* what, double least, double most) {
+        const auto number = value.value_exact<std::int64_t>();
+        if (!number || double(*number) < least || double(*number) > most)
+            wrong(value, fmt::format("a whole number, {:g} to {:g}", least, most), part(what));
+        return *number;
+    };
+    const auto amount = [&](const char* what) {
+        const toml::node* value = table->get(what);
+        const double number = value ? finite_of(*value, part(what), "a number, 0 and up") : 0;
+        if (number < 0) wrong(*value, "a number, 0 and up", part(what));
+        return number;
+    };
+    const toml::node& count = *table->get("count");
+    const toml::array* counts = count.as_array();
+    if (counts && counts->size() != 3) wrong(count, "one whole number or three", part("count"));
+    repeat.is_row = !counts;
+    for (std::size_t axis = 0; axis < (counts ? 3 : 1); ++axis)
+        repeat.count[axis] = unsigned(whole(counts ? *counts->get(axis) : count, "count", 1, kMost));
+    if (double(repeat.bodies()) > kMost)
+        fail(node, fmt::format("these are {} bodies, and {:g} are the most", repeat.bodies(), kMost));
+    if (const toml::node* step = table->get("step")) repeat.step = vector_of(*step, part("step"));
+    repeat.jitter = amount("jitter");
+    repeat.turn = kDegree * amount("turn");
+    if (const toml::node* seed = table->get("seed")) repeat.seed = std::uint64_t(whole(*seed, "seed", 0, 1e9));
 }
 
 } // namespace
@@ -75,281 +300,66 @@ void fail_at(const std::string& path, unsigned line, const std::string& what, Er
 SceneTable::SceneTable(const std::string& path, std::string_view name, const toml::table& table)
     : path_(path), name_(name), table_(table) {
     std::vector<std::string_view> known;
-    for (const KeyRule& rule : scene_keys())
-        if (rule.table == name) known.push_back(rule.key);
+    for (const SceneKey& key : scene_keys())
+        if (key.table == name) known.push_back(key.name);
     for (const auto& [key, value] : table)
         if (!find_key(name, key.str())) {
             const std::string other = table_with(key.str());
             const std::string hint =
                 other.empty() ? suggestion(key.str(), known) : fmt::format("; it belongs to {}", other);
-            fail(key.source().begin.line, fmt::format("unknown key '{}' in {}{}", key.str(), shown_table(name), hint));
+            fail_at(path_, key.source().begin.line,
+                    fmt::format("unknown key '{}' in {}{}", key.str(), shown_table(name), hint));
         }
 }
 
 unsigned SceneTable::line() const { return line_of(table_); }
 unsigned SceneTable::line(std::string_view key) const { return has(key) ? line_of(*table_.get(key)) : line(); }
 
-double SceneTable::number(std::string_view key, double unset) const {
-    const toml::node* node = table_.get(key);
-    return node ? number_of(*node, key, *find_key(name_, key)) : unset;
+void SceneTable::read(SceneOwner owner) const {
+    for (const SceneKey& key : scene_keys())
+        if (key.table == name_) read(key.name, owner);
 }
 
-bool SceneTable::flag(std::string_view key, bool unset) const {
-    const toml::node* node = table_.get(key);
-    if (!node) return unset;
-    const auto value = node->value_exact<bool>();
-    if (!value) wrong(*node, key, "true or false");
-    return *value;
+void SceneTable::read(std::string_view name, SceneOwner owner) const {
+    const toml::node* node = table_.get(name);
+    if (!node) return;
+    const SceneKey& key = *find_key(name_, name);
+    std::visit([&](auto* value) { KeyReader(path_, key).set(*node, *value); }, key.place(owner));
 }
 
-std::string SceneTable::text(std::string_view key) const {
-    const toml::node* node = table_.get(key);
-    if (!node) return "";
-    const auto value = node->value_exact<std::string>();
-    if (!value || value->empty()) wrong(*node, key, "a text");
-    return *value;
+void SceneTable::refuse_both(std::string_view one, std::string_view other) const {
+    if (has(one) && has(other)) fail(other, fmt::format("give one of {} and {}", one, other));
 }
 
-int SceneTable::word(std::string_view key, int unset) const {
-    const toml::node* node = table_.get(key);
-    if (!node) return unset;
-    std::vector<std::string_view> words;
-    const std::string_view all = find_key(name_, key)->words;
-    for (std::size_t at = 0; at < all.size(); at = std::min(all.find(' ', at), all.size()) + 1)
-        words.push_back(all.substr(at, all.find(' ', at) - at));
-    const auto value = node->value_exact<std::string>();
-    const auto found = std::find(words.begin(), words.end(), value.value_or(""));
-    if (found == words.end()) wrong(*node, key, fmt::format("one of {}", fmt::join(words, ", ")));
-    return static_cast<int>(found - words.begin());
-}
-
-void SceneTable::set(std::string_view key, Vec3d& value) const {
-    if (const toml::node* node = table_.get(key)) value = vector_of(*node, key);
-}
-
-void SceneTable::set(std::string_view key, std::optional<Vec3d>& value) const {
-    if (const toml::node* node = table_.get(key)) value = vector_of(*node, key);
-}
-
-void SceneTable::set(std::string_view key, std::optional<Vec3f>& value) const {
-    if (has(key)) value = color(key, text(key));
-}
-
-std::vector<Vec3d> SceneTable::points(std::string_view key) const {
-    std::vector<Vec3d> points;
-    const toml::node* node = table_.get(key);
-    if (!node) return points;
-    const toml::array* list = node->as_array();
-    if (!list || list->empty() || !list->get(0)->is_array()) return {vector_of(*node, key)};
-    for (const toml::node& entry : *list) points.push_back(vector_of(entry, key));
-    return points;
-}
-
-Vec3f SceneTable::color(std::string_view key, const std::string& written) const {
-    const std::optional<Vec3f> color = parse_color(written);
-    if (!color) fail(key, fmt::format("{}: '{}' is no colour; write it as #rrggbb, such as #d04030", key, written));
-    return *color;
-}
-
-Keyed<Vec3d> SceneTable::keyed(std::string_view key, double unit) const {
-    Keyed<Vec3d> value{{}, {}, Vec3d::Zero()};
-    const toml::node* node = table_.get(key);
-    if (!node) return value;
-    const toml::array* list = node->as_array();
-    if (!list || list->empty() || !list->get(0)->is_table()) {
-        value.constant = unit * vector_of(*node, key);
-        return value;
-    }
-    for (const toml::node& entry : *list) {
-        value.times.push_back(
-            time_of(entry, key, value.times, true, "three numbers, or a list of { time = t, value = [x, y, z] }"));
-        value.values.push_back(unit * vector_of(*entry.as_table()->get("value"), fmt::format("{}.value", key)));
-    }
-    return value;
-}
-
-Keyed<double> SceneTable::keyed_number(std::string_view key, double unset) const {
-    Keyed<double> value{{}, {}, unset};
-    const toml::node* node = table_.get(key);
-    if (!node) return value;
-    const KeyRule& rule = *find_key(name_, key);
-    const toml::array* list = node->as_array();
-    if (!list || list->empty()) {
-        value.constant = number_of(*node, key, rule);
-        return value;
-    }
-    for (const toml::node& entry : *list) {
-        value.times.push_back(
-            time_of(entry, key, value.times, false, "a number, or a list of { time = t, value = v }"));
-        value.values.push_back(number_of(*entry.as_table()->get("value"), key, rule));
-    }
-    return value;
-}
-
-SceneMotion SceneTable::motion() const {
-    SceneMotion motion{keyed("move"), keyed("turn", kDegree), {}};
-    set("pivot", motion.pivot);
-    return motion;
-}
-
-SceneRegion SceneTable::region() const {
-    SceneRegion region;
+void SceneTable::refuse_two_regions() const {
     if (has("box") + has("ball") + has("vertices") > 1)
-        fail(line(), shown_table(name_) + " takes one of box, ball and vertices");
-    if (has("box")) {
-        const toml::table& table = sub_table("box", {"max", "min"});
-        region.box = Box{vector_of(*table.get("min"), "box.min"), vector_of(*table.get("max"), "box.max")};
-        if (region.box->empty()) fail("box", "the box's min is not below its max");
-    }
-    if (has("ball")) {
-        const toml::table& table = sub_table("ball", {"centre", "radius"});
-        region.ball = Ball{vector_of(*table.get("centre"), "ball.centre"),
-                           finite_of(*table.get("radius"), "ball.radius", "a number above 0")};
-        if (!(region.ball->radius > 0)) wrong(*table.get("radius"), "ball.radius", "a number above 0");
-    }
-    if (has("vertices")) region.vertices = ids("vertices");
-    return region;
+        fail(shown_table(name_) + " takes one of box, ball and vertices");
 }
 
-Eigen::AngleAxisd SceneTable::rotation(std::string_view key) const {
-    if (!has(key)) return Eigen::AngleAxisd::Identity();
-    const toml::table& table = sub_table(key, {"axis", "degrees"});
-    const Vec3d axis = vector_of(*table.get("axis"), "rotate.axis");
-    if (!(axis.norm() > 0)) wrong(*table.get("axis"), "rotate.axis", "a direction with a length");
-    return Eigen::AngleAxisd(kDegree * finite_of(*table.get("degrees"), "rotate.degrees", "a number"),
-                             axis.normalized());
-}
-
-SceneRepeat SceneTable::repeat(std::string_view key) const {
-    constexpr std::array<std::string_view, 5> kParts = {"count", "step", "jitter", "turn", "seed"};
-    constexpr double kMost = 10'000;
-    const toml::node& node = *table_.get(key);
-    const toml::table* table = node.as_table();
-    if (!table || !table->contains("count"))
-        wrong(node, key, "a table such as { count = [5, 8, 1], step = [0.3, 0.2, 0.3] }");
-    for (const auto& [part, value] : *table)
-        if (std::ranges::find(kParts, part.str()) == kParts.end())
-            fail(key, fmt::format("unknown key '{}' in {}{}", part.str(), key, suggestion(part.str(), kParts)));
-    const auto whole = [&](const toml::node& value, const char* what, double least, double most) {
-        const auto number = value.value_exact<std::int64_t>();
-        if (!number || double(*number) < least || double(*number) > most)
-            wrong(value, fmt::format("{}.{}", key, what), fmt::format("a whole number, {:g} to {:g}", least, most));
-        return *number;
-    };
-    SceneRepeat repeat;
-    const toml::node& count = *table->get("count");
-    const toml::array* counts = count.as_array();
-    if (counts && counts->size() != 3) wrong(count, "repeat.count", "one whole number or three");
-    repeat.is_row = !counts;
-    for (std::size_t axis = 0; axis < (counts ? 3 : 1); ++axis)
-        repeat.count[axis] = unsigned(whole(counts ? *counts->get(axis) : count, "count", 1, kMost));
-    if (double(repeat.bodies()) > kMost)
-        fail(key, fmt::format("these are {} bodies, and {:g} are the most", repeat.bodies(), kMost));
-    if (const toml::node* step = table->get("step")) repeat.step = vector_of(*step, "repeat.step");
-    const auto amount = [&](const char* what) {
-        const toml::node* value = table->get(what);
-        const double number = value ? finite_of(*value, fmt::format("{}.{}", key, what), "a number, 0 and up") : 0;
-        if (number < 0) wrong(*value, fmt::format("{}.{}", key, what), "a number, 0 and up");
-        return number;
-    };
-    repeat.jitter = amount("jitter");
-    repeat.turn = kDegree * amount("turn");
-    if (const toml::node* seed = table->get("seed")) repeat.seed = std::uint64_t(whole(*seed, "seed", 0, 1e9));
-    return repeat;
-}
-
-std::pair<unsigned, unsigned> SceneTable::pixels(std::string_view key) const {
-    const toml::node& node = *table_.get(key);
-    const toml::array* list = node.as_array();
-    if (!list || list->size() != 2) wrong(node, key, "two whole numbers");
-    const KeyRule& rule = *find_key(name_, key);
-    return {static_cast<unsigned>(whole_of(*list->get(0), key, rule)),
-            static_cast<unsigned>(whole_of(*list->get(1), key, rule))};
-}
-
-std::string SceneTable::file(std::string_view key) const {
-    const fs::path named = text(key), path = named.is_absolute() ? named : fs::path(path_).parent_path() / named;
-    std::error_code ignored;
-    if (!fs::exists(path, ignored))
-        fail_at(path_, line(key), fmt::format("there is no file '{}' (looked for {})", text(key), path.string()),
-                ErrorCode::not_found);
-    return path.string();
-}
-
-void SceneTable::refuse_others(std::string_view shape) const {
-    for (const auto& [key, value] : table_) {
-        const KeyRule& rule = *find_key(name_, key.str());
-        if (rule.only.empty()) continue;
-        const std::string words = fmt::format(" {} ", rule.only);
-        if (words.find(fmt::format(" {} ", shape)) == std::string::npos)
-            fail(key.source().begin.line, fmt::format("'{}' in {} is for {}, and this is a {}", key.str(),
-                                                      shown_table(name_), rule.only, shape));
+void SceneTable::refuse_other_shapes(std::string_view shape) const {
+    for (const auto& [name, value] : table_) {
+        const std::string_view shapes = find_key(name_, name.str())->use.shapes;
+        if (!shapes.empty() && !has_word(shapes, shape))
+            fail(name.str(),
+                 fmt::format("'{}' in {} is for {}, and this is a {}", name.str(), shown_table(name_), shapes, shape));
     }
 }
 
-void SceneTable::wrong(const toml::node& node, std::string_view key, const std::string& wanted) const {
-    fail(line_of(node), fmt::format("'{}' in {} must be {}, and is {}", key, shown_table(name_), wanted, shown(node)));
-}
-
-double SceneTable::finite_of(const toml::node& node, std::string_view key, const std::string& wanted) const {
-    const bool is_number = node.is_integer() || node.is_floating_point();
-    const double value = is_number ? *node.value<double>() : std::nan("");
-    if (!std::isfinite(value)) wrong(node, key, wanted);
-    return value;
-}
-
-double SceneTable::number_of(const toml::node& node, std::string_view key, const KeyRule& rule) const {
-    const std::string wanted = wanted_number("a number", rule);
-    const double value = finite_of(node, key, wanted);
-    if (value < rule.least || value > rule.most || (rule.above && value == rule.least)) wrong(node, key, wanted);
-    return value;
-}
-
-std::int64_t SceneTable::whole_of(const toml::node& node, std::string_view key, const KeyRule& rule) const {
-    const auto value = node.value_exact<std::int64_t>();
-    if (!value || double(*value) < rule.least || double(*value) > rule.most)
-        wrong(node, key, wanted_number("a whole number", rule));
-    return *value;
-}
-
-Vec3d SceneTable::vector_of(const toml::node& node, std::string_view key) const {
-    const toml::array* list = node.as_array();
-    if (!list || list->size() != 3) wrong(node, key, "three numbers");
-    Vec3d value;
-    for (int i = 0; i < 3; ++i) value[i] = finite_of(*list->get(std::size_t(i)), key, "three numbers");
-    return value;
-}
-
-std::vector<Index> SceneTable::ids(std::string_view key) const {
-    const toml::node& node = *table_.get(key);
-    const toml::array* list = node.as_array();
-    if (!list || list->empty()) wrong(node, key, "a list of whole numbers from 0");
-    std::vector<Index> ids;
-    for (const toml::node& entry : *list) {
-        const auto id = entry.value_exact<std::int64_t>();
-        if (!id || *id < 0 || *id >= std::int64_t{kNoIndex}) wrong(entry, key, "a list of whole numbers from 0");
-        ids.push_back(static_cast<Index>(*id));
+void SceneTable::refuse_other_models(MaterialModel model) const {
+    std::vector<std::string_view> all;
+    each_word(find_key(name_, "model")->values.words, [&](std::string_view word) { all.push_back(word); });
+    const std::string_view own = all[std::size_t(model)];
+    for (const auto& [name, value] : table_) {
+        const std::string_view models = find_key(name_, name.str())->use.models;
+        if (models.empty() || has_word(models, own)) continue;
+        std::string right; // "a", "b" or "c"
+        each_word(models, [&](std::string_view word) {
+            const bool is_last = word.end() == models.end();
+            right += fmt::format("{}\"{}\"", right.empty() ? "" : is_last ? " or " : ", ", word);
+        });
+        fail(name.str(), fmt::format("'{}' in {} is for model = {}, and this body's is \"{}\"", name.str(),
+                                     shown_table(name_), right, own));
     }
-    return ids;
-}
-
-const toml::table& SceneTable::sub_table(std::string_view key, std::array<std::string_view, 2> keys) const {
-    const toml::node& node = *table_.get(key);
-    const toml::table* table = node.as_table();
-    if (!table || table->size() != 2 || !table->contains(keys[0]) || !table->contains(keys[1]))
-        wrong(node, key, fmt::format("a table with {} and {}", keys[0], keys[1]));
-    return *table;
-}
-
-double SceneTable::time_of(const toml::node& entry, std::string_view key, std::span<const double> before, bool may_jump,
-                           const char* wanted) const {
-    const toml::table* table = entry.as_table();
-    if (!table || table->size() != 2 || !table->contains("time") || !table->contains("value"))
-        wrong(entry, key, wanted);
-    const double time = finite_of(*table->get("time"), fmt::format("{}.time", key), "a number");
-    if (!before.empty() && (may_jump ? time < before.back() : time <= before.back()))
-        fail(line_of(entry), fmt::format("the times of '{}' in {} must ascend", key, shown_table(name_)));
-    return time;
 }
 
 } // namespace filigree

@@ -66,6 +66,7 @@ public:
 
     ReadyScene build() {
         hash_.add(scene_.content);
+        result_.world = scene_.world;
         result_.bodies.reserve(scene_.bodies.size());
         for (const SceneBody& body : scene_.bodies) add_body(body);
         choose_origin();
@@ -77,19 +78,7 @@ public:
                 {force.body, particles_of(force.body, force.region, force.line), force.newtons});
         for (const SceneHand& hand : scene_.hands) add_hand(hand);
         warn_of_what_mpm_does_not_feel();
-        result_.world.gravity = scene_.gravity;
-        result_.world.wind = scene_.wind;
-        result_.world.air_density = scene_.air_density;
-        result_.world.air_temperature = scene_.air_temperature;
-        result_.world.air_heat_transfer = scene_.air_heat_transfer;
-        result_.world.heat_pace = scene_.heat_pace;
-        for (HeatSource source : scene_.heat_sources) {
-            source.ball.centre -= result_.origin;
-            result_.world.heat_sources.push_back(std::move(source));
-        }
-        result_.world.body_friction = scene_.body_friction;
-        result_.world.body_restitution = scene_.body_restitution;
-        result_.world.group_pairs = scene_.pairs;
+        for (HeatSource& source : result_.world.heat_sources) source.ball.centre -= result_.origin;
         result_.hash = hash_.value();
         return std::move(result_);
     }
@@ -188,7 +177,7 @@ private:
     }
 
     void warn_of_weight(const SceneBody& from, const Body& body, const Mat3d& turn) {
-        const std::string weight = weight_warning(body, turn, scene_.gravity, from.material_name, from.body.size);
+        const std::string weight = weight_warning(body, turn, scene_.world.gravity, from.material_name, from.body.size);
         if (!weight.empty()) warn(called(from) + " " + weight);
     }
 
@@ -231,7 +220,7 @@ private:
         obstacle.ball.centre -= result_.origin;
         obstacle.box.centre -= result_.origin;
         move_to_origin(obstacle.centre);
-        move_to_origin(obstacle.motion.pivot);
+        move_to_origin(obstacle.pivot);
         return obstacle;
     }
     SceneRegion from_origin(SceneRegion region) const {
@@ -282,16 +271,8 @@ private:
         });
     }
 
-    static RigidMotion motion_of(const SceneMotion& from, const Vec3d& middle) {
-        RigidMotion motion;
-        motion.centre = from.pivot.value_or(middle);
-        motion.move = from.move;
-        motion.angle = from.angle;
-        return motion;
-    }
-
     void add_obstacle(const SceneObstacle& from) {
-        Obstacle obstacle;
+        Obstacle obstacle = from.obstacle;
         ShownObstacle drawn;
         Vec3d middle = Vec3d::Zero();
         if (from.shape == "ground") {
@@ -327,14 +308,10 @@ private:
             for (Vec3f& p : mesh.positions) p = (from.scale * p.cast<double>() + shape.offset).cast<float>();
             mesh.origin = Vec3d::Zero();
         }
-        obstacle.motion = drawn.motion = motion_of(from.motion, middle);
-        obstacle.friction = from.friction;
-        obstacle.temperature = from.temperature;
-        obstacle.heat_transfer = from.heat_transfer;
-        obstacle.restitution = from.restitution;
-        obstacle.stiffness = from.stiffness;
+        obstacle.motion.centre = from.pivot.value_or(middle);
+        drawn.motion = obstacle.motion;
+        drawn.moves = obstacle.motion.moves();
         result_.world.obstacles.push_back(std::move(obstacle));
-        drawn.moves = from.motion.moves();
         drawn.color = from.color.value_or(kObstacleColor);
         if (from.visible) result_.drawn.push_back(std::move(drawn));
     }
@@ -388,9 +365,8 @@ private:
         Vec3d middle = Vec3d::Zero();
         for (const Index i : pin.particles)
             middle += actor.placement * actor.body->rest[i].cast<double>() / double(pin.particles.size());
-        SceneMotion motion = from.motion;
-        move_to_origin(motion.pivot);
-        pin.motion = motion_of(motion, middle);
+        pin.motion = from.motion;
+        pin.motion.centre = from.pivot ? Vec3d(*from.pivot - result_.origin) : middle;
         result_.world.pins.push_back(std::move(pin));
     }
 
