@@ -425,6 +425,7 @@ void DrawnObjects::ask_for_levels(unsigned calm, bool all) {
 double DrawnObjects::prepare(std::span<const unsigned> levels) {
     const RunContext context;
     double spent = 0;
+    drawn_level_ = levels[0];
     for (const unsigned number : levels) {
         ShownLevel* level = shown_->level(number);
         if (!level) continue;
@@ -562,6 +563,15 @@ std::span<const Vec3f> DrawnObjects::positions(unsigned level) {
         found->values = shown->shape->positions(pose_, RunContext());
     }
     return found->values;
+}
+
+std::optional<Vec3d> DrawnObjects::place_of_vertex(Index vertex) {
+    const std::optional<unsigned> level = shown_ ? shown_->nearest_ready(drawn_level_) : std::nullopt;
+    if (!level) return std::nullopt;
+    const std::span<const Vec3f> places = positions(*level);
+    const std::optional<Index> of_level = shown_->level(*level)->shape->vertex_of(vertex);
+    if (!of_level || *of_level >= places.size()) return std::nullopt;
+    return origin() + places[*of_level].cast<double>();
 }
 
 Box DrawnObjects::box() {

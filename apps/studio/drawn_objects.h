@@ -58,6 +58,8 @@ public:
 
     /// Positions of a level as posed, relative to the origin; kept until the pose changes.
     std::span<const Vec3f> positions(unsigned level);
+    /// Where a vertex of the finest mesh is in the picture, in the world; none: the level drawn does not have it.
+    std::optional<Vec3d> place_of_vertex(Index vertex);
     Vec3d origin() const;
     /// The box of what is drawn, in the world; exact.
     Box box();
@@ -142,7 +144,8 @@ private:
     std::uint64_t net_stamp_ = 0, net_pose_ = 0;
     Vec3d net_eye_ = Vec3d::Zero();
     double net_offset_ = 0;
-    unsigned by_size_ = 0;  ///< the level chosen by size on screen
+    unsigned by_size_ = 0; ///< the level chosen by size on screen
+    unsigned drawn_level_ = 0;
     ViewSettings settings_; ///< as last followed
 
     struct Positions {

@@ -155,10 +155,10 @@ TEST_F(ActionsTest, SwitchesAndChoicesOfTheView) {
     EXPECT_TRUE(action("view.wireframe").isChecked());
     trigger("view.color_levels");
     EXPECT_EQ(workbench().view().settings().coloring, Coloring::levels);
-    for (const auto& [name, tool] : {std::pair{"tool.pin", Tool::pin},
-                                     {"tool.turn", Tool::turn},
-                                     {"tool.torch", Tool::torch},
-                                     {"tool.pull", Tool::pull}}) {
+    for (const auto& [name, tool] : {std::pair{"tool.pin", &kPinTool},
+                                     {"tool.turn", &kTurnTool},
+                                     {"tool.torch", &kTorchTool},
+                                     {"tool.pull", &kPullTool}}) {
         trigger(name);
         EXPECT_EQ(workbench().view().settings().tool, tool) << name;
     }
