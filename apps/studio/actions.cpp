@@ -1,5 +1,6 @@
 #include "actions.h"
 
+#include "coloring.h"
 #include "file_dialogs.h"
 #include "icons.h"
 #include "panels/panels.h"
@@ -239,26 +240,18 @@ struct Actions::Impl {
             view_choice("styles", "view.wireframe", "&Wireframe", "The edges of the faces alone", "W", &V::style,
                         SurfaceStyle::wireframe),
             kSeparator,
-            view_choice("colors", "view.color_own", "&Own colours", "The mesh's own colours", "Shift+1", &V::coloring,
-                        Coloring::own),
-            view_choice("colors", "view.color_error", "E&rror as colours",
-                        "How far each vertex is from the full deformation", "Shift+2", &V::coloring, Coloring::error),
-            view_choice("colors", "view.color_levels", "&Levels as colours", "The level at which each vertex is added",
-                        "Shift+3", &V::coloring, Coloring::levels),
-            view_choice("colors", "view.color_patches", "Patc&hes as colours",
-                        "The patches of regular quads, each in a colour unlike its neighbours'", "Shift+4",
-                        &V::coloring, Coloring::patches),
-            view_choice("colors", "view.color_expected", "E&xpected error as colours",
-                        "Where the pose is more curved than the driver can follow", "Shift+5", &V::coloring,
-                        Coloring::expected_error),
-            view_choice("colors", "view.color_pieces", "Pi&eces as colours", "Each piece of a mesh that breaks",
-                        "Shift+6", &V::coloring, Coloring::pieces),
-            view_choice("colors", "view.color_heat", "&Heat as colours", "How warm a body that melts is", "Shift+7",
-                        &V::coloring, Coloring::heat),
-            {"view.measure_error", "M&easure error", "Measures what is shown against the full deformation", "Ctrl+M",
-             [this] { workbench.measure_error(); }, has_model},
-            kSeparator,
         };
+    }
+
+    std::vector<Command> color_menu() {
+        std::vector<Command> menu;
+        for (const Coloring* const coloring : colorings())
+            menu.push_back(view_choice("colors", QStringLiteral("view.color_") + coloring->name, coloring->text,
+                                       coloring->tip, coloring->keys, &ViewSettings::coloring, coloring));
+        menu.push_back({"view.measure_error", "M&easure error", "Measures what is shown against the full deformation",
+                        "Ctrl+M", [this] { workbench.measure_error(); }, has_model});
+        menu.push_back(kSeparator);
+        return menu;
     }
 
     std::vector<Command> view_menu() {
@@ -455,6 +448,7 @@ Actions::Actions(Workbench& workbench, Viewport& viewport, MainWindow& window)
     : impl_(new Impl(*this, workbench, viewport, window)) {
     std::vector<Command> edit = impl_->edit_menu(), view = impl_->look_menu();
     std::ranges::copy(impl_->tool_menu(), std::back_inserter(edit));
+    std::ranges::copy(impl_->color_menu(), std::back_inserter(view));
     std::ranges::copy(impl_->view_menu(), std::back_inserter(view));
     impl_->add_menu("menu.file", "&File", impl_->file_menu());
     impl_->add_menu("menu.edit", "&Edit", edit);

@@ -11,14 +11,15 @@
 namespace filigree::studio {
 
 enum class SurfaceStyle { shaded, edges, wireframe };
-enum class Coloring { own, error, levels, patches, expected_error, pieces, heat };
 
+struct Coloring; ///< coloring.h
+extern const Coloring kOwnColors;
 struct ToolEntry; ///< tools/tool.h
 extern const ToolEntry kPullTool;
 
 struct ViewSettings {
     SurfaceStyle style = SurfaceStyle::shaded;
-    Coloring coloring = Coloring::own;
+    const Coloring* coloring = &kOwnColors;
     const ToolEntry* tool = &kPullTool;
     bool split = false;         ///< driver | restored | full deformation
     bool driver = false;        ///< the driver's edges over the mesh

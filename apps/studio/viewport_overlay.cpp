@@ -1,5 +1,6 @@
 #include "viewport_overlay.h"
 
+#include "coloring.h"
 #include "pins.h"
 #include "words.h"
 
@@ -62,19 +63,11 @@ private:
     }
 
     void add_legend() {
+        const LegendWords& words = settings_.coloring->legend;
         const VertexColors& colors = drawn_.colors();
-        if (colors.values.empty() || settings_.coloring == Coloring::pieces) return;
-        const bool is_levels = settings_.coloring == Coloring::levels;
-        if (settings_.coloring == Coloring::heat) {
-            content.legend = OverlayContent::Legend{"Temperature", "°C", colors.map, colors.range, 1.0, true};
-            return;
-        }
-        const char* const title = is_levels ? "Level at which a vertex comes in"
-                                  : settings_.coloring == Coloring::expected_error
-                                      ? "Expected error"
-                                      : "Distance from the full deformation";
-        content.legend = OverlayContent::Legend{
-            title, is_levels ? "" : "% of the diagonal", colors.map, colors.range, is_levels ? 1.0 : 100.0, is_levels};
+        if (words.title && !colors.values.empty())
+            content.legend =
+                OverlayContent::Legend{words.title, words.unit, colors.map, colors.range, words.per_value, words.whole};
     }
 
     void add_pins() {
@@ -93,7 +86,7 @@ private:
             if (finding->count > 0) found.push_back(with_commas(finding->count) + ' ' + name);
         content.defect_summary = found.empty() ? "No defects: the mesh is closed and manifold"
                                                : QStringList(found.begin(), found.end()).join('\n');
-        const std::vector<DefectEdge>& defects = drawn_.defects();
+        const std::span<const DefectEdge> defects = drawn_.defects();
         const std::span<const Vec3f> positions = drawn_.positions(drawn_.shown()->finest_level());
         if (defects.empty() || positions.empty()) return;
         const std::size_t step = (defects.size() + kMostDefects - 1) / kMostDefects;
@@ -120,12 +113,9 @@ private:
                 .arg(drawn_level_)
                 .arg(shown->finest_level())
                 .arg(with_commas(facts().vertices));
-        if (shown && settings_.coloring == Coloring::patches && !drawn_.patches_problem().empty())
-            return QString::fromStdString(drawn_.patches_problem());
-        if (shown && settings_.coloring == Coloring::expected_error && state.model->code() != DetailCode::blend)
-            return "The expected error is known for the blend code alone.";
-        if (shown && settings_.coloring == Coloring::heat && drawn_.colors().values.empty())
-            return "Heat is known of a body that melts while it moves: choose wax or ice in the Body panel.";
+        const auto why_no_colors = settings_.coloring->why_not;
+        if (const QString why = shown && why_no_colors ? why_no_colors(drawn_.seen()) : QString(); !why.isEmpty())
+            return why;
         if (!state.source) return {};
         if (!(state.source->box.diagonal() > 0)) return "All vertices are in one place, so there is no shape to show.";
         if (state.source->mesh.face_count() == 0) return "This mesh has no faces: its vertices are shown as balls.";

@@ -1,4 +1,5 @@
 // What the mouse does in the picture.
+#include "coloring.h"
 #include "viewport_stand.h"
 
 #include "overlay.h"
@@ -190,7 +191,7 @@ TEST(Pointer, TheTorchMeltsABodyUnderTheMouse) {
     workbench.make_body();
     workbench.wait_until_idle();
     ASSERT_TRUE(stand.is_ready());
-    stand.set([](ViewSettings& s) { s.coloring = Coloring::heat; });
+    stand.set([](ViewSettings& s) { s.coloring = &kHeatColors; });
     QTest::mousePress(stand.viewport, Qt::LeftButton, {}, stand.middle());
     EXPECT_TRUE(QTest::qWaitFor([&] { return workbench.melt_surface() != nullptr; }, 60'000));
     QTest::mouseRelease(stand.viewport, Qt::LeftButton, {}, stand.middle());

@@ -89,6 +89,7 @@ struct ToolEntry {
     std::vector<Stroke> icon;
     std::vector<Gesture> gestures;
     std::unique_ptr<Tool> (*make)(const ToolContext& context);
+    const Coloring* colors = nullptr; ///< what it changes, as one more colouring of the view; null: nothing of the kind
 };
 
 /// The tool as `make` of a row.

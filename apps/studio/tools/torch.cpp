@@ -1,4 +1,5 @@
 // Warms or cools a body that melts where the mouse is held.
+#include "coloring.h"
 #include "tools/tool.h"
 
 namespace filigree::studio {
@@ -48,6 +49,7 @@ const ToolEntry kTorchTool = {.name = "torch",
                                        {StrokeKind::line, {8, 12, 8, 15}},
                                        {StrokeKind::line, {6, 15, 10, 15}}},
                               .gestures = {{"hold the surface", "warms a body that melts; with Ctrl: cools it"}},
-                              .make = make_tool<TorchTool>};
+                              .make = make_tool<TorchTool>,
+                              .colors = &kHeatColors};
 
 } // namespace filigree::studio
