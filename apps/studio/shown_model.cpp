@@ -17,11 +17,6 @@ bool ShownModel::is_of(const State& state) const {
            state.restore.thin_shell == restore_.thin_shell;
 }
 
-const std::vector<float>& ShownModel::arrival() {
-    if (arrival_.empty()) arrival_ = vertex_levels(*model_, finest_level());
-    return arrival_;
-}
-
 void ShownModel::ask(unsigned level, bool is_urgent, Jobs& background,
                      std::function<void(std::function<void()>)> upload,
                      std::function<void(const std::optional<Error>&)> ready) {

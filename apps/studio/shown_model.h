@@ -4,18 +4,12 @@
 
 #include "document.h"
 #include "jobs.h"
+#include "vertex_colors.h"
 
 #include "filigree/present/level_shape.h"
 #include "filigree/render.h"
 
 namespace filigree::studio {
-
-/// Numbers of the finest mesh's vertices to be shown as colours, with the legend's title.
-struct VertexColors {
-    std::vector<float> values; ///< empty: none
-    ColorMap map = ColorMap::sequential;
-    ValueRange range;
-};
 
 /// One level in graphics memory. Lives and dies with the OpenGL context current.
 struct ShownLevel {
@@ -38,8 +32,6 @@ public:
     unsigned finest_level() const { return model_->finest_level(); }
     const std::vector<LevelFacts>& facts() const { return facts_; }
     const Pose& rest_pose() const { return rest_pose_; }
-    /// The level at which each vertex of the finest mesh comes in. Made when first asked for.
-    const std::vector<float>& arrival();
 
     /// Prepares a level unless it was asked for before. `upload` runs its argument with OpenGL at hand; `ready` is
     /// called when the level is there, or with the error that says why there will be none.
@@ -70,7 +62,6 @@ private:
     std::vector<std::unique_ptr<ShownLevel>> levels_;
     std::vector<char> asked_;
     std::vector<LevelFacts> facts_;
-    std::vector<float> arrival_;
     bool is_measured_ = false;
     std::shared_ptr<int> life_ = std::make_shared<int>(); ///< deliveries come only while it lives
 };

@@ -11,13 +11,16 @@
 namespace filigree::studio {
 
 enum class SurfaceStyle { shaded, edges, wireframe };
-enum class Coloring { own, error, levels, patches, expected_error, pieces, heat };
-enum class Tool { pull, pin, turn, torch };
+
+struct Coloring; ///< coloring.h
+extern const Coloring kOwnColors;
+struct ToolEntry; ///< tools/tool.h
+extern const ToolEntry kPullTool;
 
 struct ViewSettings {
     SurfaceStyle style = SurfaceStyle::shaded;
-    Coloring coloring = Coloring::own;
-    Tool tool = Tool::pull;
+    const Coloring* coloring = &kOwnColors;
+    const ToolEntry* tool = &kPullTool;
     bool split = false;         ///< driver | restored | full deformation
     bool driver = false;        ///< the driver's edges over the mesh
     bool defects = false;       ///< open and non-manifold edges marked

@@ -1,5 +1,7 @@
 #include "workbench_impl.h"
 
+#include "coloring.h"
+
 #include "filigree/deform/restored_error.h"
 
 #include "filigree/physics/material.h"
@@ -167,7 +169,7 @@ void Workbench::find_full() {
 
 void Workbench::full_is_new() {
     Q_EMIT full_changed();
-    if (!full_.empty() && view_.settings().coloring == Coloring::error && !is_playing()) measure_error();
+    if (!full_.empty() && view_.settings().coloring == &kErrorColors && !is_playing()) measure_error();
 }
 
 void Workbench::want_full(bool wanted) {

@@ -357,7 +357,7 @@ void Workbench::export_film(const std::string& path, const FilmSettings& setting
         if (!frames) return frames.error();
         QString text = QString("Saved %1: %2.").arg(file_name(path), counted(*frames, "picture", "pictures"));
         std::vector<QString> left_out;
-        if (view.coloring != Coloring::own) left_out.push_back("colouring");
+        if (view.coloring != &kOwnColors) left_out.push_back("colouring");
         if (view.clip) left_out.push_back("the clip plane");
         if (view.split) left_out.push_back("the split view");
         if (view.particles || view.inside_points) left_out.push_back("points");

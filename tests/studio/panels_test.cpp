@@ -1,3 +1,4 @@
+#include "coloring.h"
 #include "one_window.h"
 #include "panel.h"
 
@@ -191,9 +192,9 @@ TEST_F(Panels, ChoicesAndSwitchesReachTheWorkbench) {
     choose("view.style", 2);
     EXPECT_EQ(workbench().view().settings().style, SurfaceStyle::wireframe);
     choose("view.coloring", 2);
-    EXPECT_EQ(workbench().view().settings().coloring, Coloring::levels);
+    EXPECT_EQ(workbench().view().settings().coloring, &kLevelColors);
     choose("view.coloring", 4);
-    EXPECT_EQ(workbench().view().settings().coloring, Coloring::expected_error);
+    EXPECT_EQ(workbench().view().settings().coloring, &kExpectedErrorColors);
     EXPECT_TRUE(get<QLabel>("view.error").isVisibleTo(get<QScrollArea>("view").widget()));
     choose("view.up", 2);
     EXPECT_EQ(workbench().view().settings().up, UpAxis::z);
@@ -330,7 +331,7 @@ TEST_F(Panels, NothingIsCutOff) {
     get<QToolButton>("body.advanced").setChecked(true);
     ViewSettings settings;
     settings.clip = settings.inside_points = true;
-    settings.coloring = Coloring::error;
+    settings.coloring = &kErrorColors;
     workbench().view().set(settings);
     choose("body.preset", 8); // wax: all of its rows
     for (const char* panel : {"model", "quads", "detail", "deform", "body", "fracture", "view"}) {
