@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/mesh/mesh.h"
-#include "filigree/render/color_map.h"
+#include "filigree/render.h"
 
 #include <memory>
 #include <vector>
