@@ -15,7 +15,7 @@ namespace filigree {
 
 namespace {
 
-constexpr int kSamples = 6;     ///< along each axis of a cell that pieces share
+constexpr int kCellSamples = 6; ///< along each axis of a cell that pieces share
 constexpr float kSpeck = 0.25f; ///< samples that a piece counts as which none found in a cell
 constexpr float kGap = 0.02f;   ///< spacings that a crack's surface points keep from the other pieces at rest
 constexpr int kGapSteps = 6;
@@ -94,10 +94,10 @@ private:
                 }
                 Shares inside, all;
                 const auto& cell = whole_.cells.cells[c];
-                for (int n = 0; n < kSamples * kSamples * kSamples; ++n) {
-                    const Vec3d at(cell[0] + (n % kSamples + 0.5) / kSamples,
-                                   cell[1] + (n / kSamples % kSamples + 0.5) / kSamples,
-                                   cell[2] + (n / kSamples / kSamples + 0.5) / kSamples);
+                for (int n = 0; n < kCellSamples * kCellSamples * kCellSamples; ++n) {
+                    const Vec3d at(cell[0] + (n % kCellSamples + 0.5) / kCellSamples,
+                                   cell[1] + (n / kCellSamples % kCellSamples + 0.5) / kCellSamples,
+                                   cell[2] + (n / kCellSamples / kCellSamples + 0.5) / kCellSamples);
                     const Vec3d point = whole_.cells.origin + whole_.spacing() * at;
                     const Index piece = result_.partition.piece_at(point);
                     add_share(all, piece, 1);
