@@ -9,7 +9,9 @@
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/render.h"
-#include "filigree/sample/spacing_for_count.h"
+#include "filigree/sample.h"
+#include "filigree/sample/closure.h"
+#include "filigree/sample/inside_rays.h"
 
 #include "interactive/fidelity.h"
 

@@ -9,7 +9,7 @@
 #include "filigree/melting/particle_field.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/surfels.h"
-#include "filigree/sample/spacing_for_count.h"
+#include "filigree/sample.h"
 
 #include <algorithm>
 #include <cmath>

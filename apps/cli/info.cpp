@@ -6,7 +6,7 @@
 #include "filigree/io/gltf.h"
 #include "filigree/mesh/topology.h"
 #include "filigree/remesh/quad_quality.h"
-#include "filigree/sample/closure.h"
+#include "filigree/sample.h"
 
 #include <cmath>
 

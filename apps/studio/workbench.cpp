@@ -5,7 +5,7 @@
 #include "filigree/deform/restored_error.h"
 
 #include "filigree/physics/material.h"
-#include "filigree/sample/spacing_for_count.h"
+#include "filigree/sample.h"
 
 #include <QCoreApplication>
 #include <QEventLoop>

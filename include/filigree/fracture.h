@@ -12,7 +12,7 @@
 #include "filigree/core/run_context.h"
 #include "filigree/core/types.h"
 #include "filigree/mesh/mesh.h"
-#include "filigree/sample/outward.h"
+#include "filigree/sample.h"
 
 #include <memory>
 #include <optional>

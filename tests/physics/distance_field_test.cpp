@@ -4,7 +4,8 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/sample/inside_test.h"
+#include "filigree/sample.h"
+#include "filigree/sample/closure.h"
 #include "io/corpus.h"
 #include "threads.h"
 

@@ -10,7 +10,7 @@
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/physics/simulation.h"
-#include "filigree/sample/sample_inside.h"
+#include "filigree/sample.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

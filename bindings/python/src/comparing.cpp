@@ -3,7 +3,7 @@
 #include <filigree/mesh/mesh_distance.h>
 #include <filigree/mesh/topology.h>
 #include <filigree/remesh/quad_quality.h>
-#include <filigree/sample/closure.h>
+#include <filigree/sample.h>
 
 namespace filigree::python {
 

@@ -10,8 +10,7 @@
 #include "filigree/core/types.h"
 #include "filigree/mesh/mesh.h"
 #include "filigree/physics/material.h"
-#include "filigree/sample/outward.h"
-#include "filigree/sample/sample_inside.h"
+#include "filigree/sample.h"
 
 #include <array>
 #include <memory>

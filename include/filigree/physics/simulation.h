@@ -1,13 +1,16 @@
 // The simulation: bodies in a world, frame after frame.
 //
-//     World world;                                  // gravity alone
-//     world.obstacles.push_back({HalfSpace{}});     // and the ground
-//     Simulation simulation = Simulation::create(world, {{.body = body}}, {}).value();
+//     World world;                                         // gravity alone
+//     world.obstacles.push_back({.shape = HalfSpace{}});   // and the ground
+//     Simulation simulation = Simulation::create(world, {{.body = body}}).value();
 //     const std::size_t driver = simulation.attach(0, points);
-//     simulation.advance().value();                 // a frame
-//     simulation.attached(driver, positions, gradients);
+//     for (int frame = 0; frame < 60; ++frame) {
+//         simulation.advance().value();
+//         simulation.attached(driver, positions, gradients);
+//     }
 //
-// Attach a model's driver, and restore.h moves the detailed mesh along with the body.
+// Attach the driver of a model: restore.h then gives the detailed mesh from positions and gradients. `body` is a
+// shared_ptr to a Body (physics/body.h). The world may change between frames: bodies come and go, obstacles are moved.
 #pragma once
 
 #include "filigree/core/types.h"
@@ -170,15 +173,15 @@ struct SimulationState;
 class Simulation {
 public:
     /// Errors: usage (what check_world refuses; an option out of range).
-    static Result<Simulation> create(World world, std::vector<Actor> actors, const StepOptions& options,
-                                     const RunContext& context);
+    static Result<Simulation> create(World world, std::vector<Actor> actors, const StepOptions& options = {},
+                                     const RunContext& context = RunContext());
     Simulation(Simulation&&) noexcept;
     Simulation& operator=(Simulation&&) noexcept;
     ~Simulation();
 
     /// Moves everything by one frame. Errors: cancelled; the state is then that of the start of the frame. The same
     /// holds when memory runs out (std::bad_alloc).
-    Result<FrameReport> advance(const RunContext& context);
+    Result<FrameReport> advance(const RunContext& context = RunContext());
 
     std::size_t frame() const; ///< frames done
     double time() const;       ///< s
@@ -201,7 +204,7 @@ public:
     Status set_velocities(std::size_t body, const Vectors& velocities);
     /// Replaces all hands. Each hand takes hold of the particles around its point on the body at rest. Errors: usage
     /// (what check_hands refuses); the old hands then stay.
-    Status set_hands(std::vector<Hand> hands, const RunContext& context);
+    Status set_hands(std::vector<Hand> hands, const RunContext& context = RunContext());
     /// Sets a force on every particle of a body, N, from now on. Empty: no forces. A body with forces does not sleep.
     /// In a broken body the copies of a particle share its force by mass. save() does not keep forces and hands.
     /// Errors: usage (no such body, another number of particles, a force that is not finite).
@@ -218,7 +221,7 @@ public:
     /// the set-up of that body, and O(bodies). Errors: usage (what check_actor refuses; a body of mpm that is coarser
     /// than the grid that other bodies of mpm share), cancelled; nothing has changed then. When memory runs out,
     /// destroy the simulation.
-    Result<std::size_t> add_body(const Actor& actor, const RunContext& context);
+    Result<std::size_t> add_body(const Actor& actor, const RunContext& context = RunContext());
     /// Removes a body with its pieces, pins, forces, hands and attachments. Bodies that lay on it wake. Its number is
     /// not used again. Errors: usage (no such body).
     Status remove_body(std::size_t body);
@@ -252,7 +255,7 @@ public:
     /// Wakes a body. Bodies that lie on it wake when it moves. Errors: usage (no such body).
     Status wake(std::size_t body);
 
-    Energy energy(const RunContext& context) const;
+    Energy energy(const RunContext& context = RunContext()) const;
     Momentum momentum() const;
     FractureReport fracture(std::size_t body) const;
     /// The inverted cells of a body and of its pieces. Rigid bodies and models without cells have none. Cost O(cells).
@@ -260,7 +263,7 @@ public:
 
     /// Attaches points to a body, such as the driver of a model. points: on the body at rest, m. Returns a number for
     /// `attached`. Cost O(points log particles).
-    std::size_t attach(std::size_t body, std::span<const Vec3f> points, const RunContext& context);
+    std::size_t attach(std::size_t body, std::span<const Vec3f> points, const RunContext& context = RunContext());
     /// Whether the body of an attachment is still there; if not, `attached` does nothing.
     bool has_attachment(std::size_t attachment) const;
     /// Attaches points of a body that breaks, each to a piece: pieces[i] is the number of point i's piece in the
@@ -292,7 +295,8 @@ private:
     explicit Simulation(std::unique_ptr<SimulationState> state);
     Status check_obstacle(std::size_t obstacle) const;
     Status check_count(std::size_t body, const Vectors& vectors, const char* what) const;
-    std::size_t attach_on_grid(std::size_t body, std::span<const Vec3f> points, const RunContext& context);
+    std::size_t attach_on_grid(std::size_t body, std::span<const Vec3f> points,
+                               const RunContext& context = RunContext());
     Status check_vectors(std::size_t body, const Vectors& vectors, const char* what) const;
     std::unique_ptr<SimulationState> state_;
 };

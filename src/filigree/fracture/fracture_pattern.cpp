@@ -5,9 +5,8 @@
 #include "filigree/fracture/cell_clumps.h"
 #include "filigree/fracture/crack_warp.h"
 #include "filigree/mesh/triangulate.h"
+#include "filigree/sample.h"
 #include "filigree/sample/closure.h"
-#include "filigree/sample/spacing_for_count.h"
-#include "filigree/sample/spread_inside.h"
 
 #include <algorithm>
 #include <cmath>

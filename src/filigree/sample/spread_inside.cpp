@@ -1,9 +1,8 @@
-#include "filigree/sample/spread_inside.h"
+#include "filigree/sample.h"
 
 #include "filigree/core/hash.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/random.h"
-#include "filigree/sample/inside_test.h"
 
 #include <algorithm>
 #include <array>

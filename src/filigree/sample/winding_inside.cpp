@@ -4,6 +4,8 @@
 // with a closed mesh are whole numbers, exactly. The winding numbers of the cones are then subtracted; only they need a
 // tree. They vary slowly away from the cones, so most blocks of points are decided at their centres.
 #include "filigree/sample/winding_inside.h"
+#include "filigree/sample/inside_scan.h"
+#include "filigree/sample/lattice_memory.h"
 
 #include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"

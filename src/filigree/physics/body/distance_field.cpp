@@ -2,7 +2,8 @@
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/closest_point.h"
-#include "filigree/sample/sample_inside.h"
+#include "filigree/sample.h"
+#include "filigree/sample/closure.h"
 
 #include <algorithm>
 #include <cmath>
