@@ -1,4 +1,7 @@
-#include "tools/gizmo.h"
+// The knobs of the deformations in the picture, there while the tool Pull is in hand.
+#include "tools/tool.h"
+
+#include "filigree/present/warp_gizmo.h"
 
 #include <algorithm>
 
@@ -27,7 +30,27 @@ QString gizmo_label(GizmoPart part, const Warps& warps) {
     }
 }
 
-} // namespace
+class GizmoTool : public Tool {
+public:
+    using Tool::Tool;
+
+    bool press(const Hit& hit) override;
+    void move(const Hit& hit) override;
+    void release() override;
+    void cancel() override;
+    bool hover(const Hit& hit) override;
+    Qt::CursorShape cursor(bool is_held) const override;
+    void draw(OverlayContent& content, bool is_hot) const override;
+
+private:
+    std::vector<GizmoShape> shapes() const; ///< none while they are not to be seen
+    std::optional<GizmoPart> part_at(const QPointF& at) const;
+
+    std::optional<GizmoDrag> drag_;
+    std::optional<GizmoPart> part_;      ///< that was last under the mouse, or is dragged
+    std::shared_ptr<const Model> model_; ///< there when the drag began
+    int step_ = 0;                       ///< of the history then
+};
 
 std::vector<GizmoShape> GizmoTool::shapes() const {
     const State& state = workbench().state();
@@ -107,5 +130,9 @@ void GizmoTool::draw(OverlayContent& content, bool is_hot) const {
         content.knobs.push_back(std::move(knob));
     }
 }
+
+} // namespace
+
+std::unique_ptr<Tool> make_gizmo(const ToolContext& context) { return std::make_unique<GizmoTool>(context); }
 
 } // namespace filigree::studio
