@@ -23,10 +23,9 @@ ColorWork at_once(VertexColors colors) {
 
 std::optional<ColorKey> error_key(const Seen& seen) {
     const std::optional<VertexDistance>& error = seen.workbench.error();
-    const bool is_measured =
-        seen.pose_number != 0 && !seen.knows_full && error && error->per_vertex.size() == seen.model->vertex_count();
-    if (seen.pose_number != 0 && !seen.knows_full && !is_measured) return std::nullopt;
-    return ColorKey{seen.model, seen.pose_number, is_measured};
+    if (seen.pose_number == 0 || seen.knows_full) return ColorKey{seen.model, 2 * seen.pose_number};
+    if (!error || error->per_vertex.size() != seen.model->vertex_count()) return std::nullopt;
+    return ColorKey{seen.model, 2 * seen.pose_number + 1}; // as measured
 }
 
 ColorWork error_work(const Seen& seen) {
@@ -52,7 +51,7 @@ ColorWork error_work(const Seen& seen) {
 
 // Levels
 
-std::optional<ColorKey> level_key(const Seen& seen) { return ColorKey{seen.model}; }
+std::optional<ColorKey> level_key(const Seen& seen) { return ColorKey{seen.model, 0}; }
 
 ColorWork level_work(const Seen& seen) {
     const unsigned finest = seen.model->finest_level();
@@ -87,7 +86,7 @@ QString why_no_expected_error(const Seen& seen) {
 std::optional<ColorKey> piece_key(const Seen& seen) {
     const std::shared_ptr<const MadePieces>& pieces = seen.workbench.state().source->pieces;
     if (!pieces || pieces->breaking->carried.vertices.size() != seen.model->vertex_count()) return std::nullopt;
-    return ColorKey{pieces};
+    return ColorKey{pieces, 0};
 }
 
 ColorWork piece_work(const Seen& seen) {
@@ -127,65 +126,51 @@ constexpr const char* kPerDiagonal = "% of the diagonal";
 
 } // namespace
 
-const Coloring kOwnColors = {
-    .name = "own", .text = "&Own colours", .tip = "The mesh's own colours", .keys = "Shift+1", .choice = "Its own"};
+const Coloring kOwnColors = {"own", "&Own colours", "The mesh's own colours", "Shift+1", "Its own"};
 
-const Coloring kErrorColors = {.name = "error",
-                               .text = "E&rror as colours",
-                               .tip = "How far each vertex is from the full deformation",
-                               .keys = "Shift+2",
-                               .choice = "Error",
-                               .needs = {.full = true},
-                               .key = error_key,
-                               .work = error_work,
-                               .legend = {"Distance from the full deformation", kPerDiagonal, 100}};
+const Coloring kErrorColors = {
+    "error",   "E&rror as colours", "How far each vertex is from the full deformation",        "Shift+2",     "Error",
+    error_key, error_work,          {"Distance from the full deformation", kPerDiagonal, 100}, {.full = true}};
 
-const Coloring kLevelColors = {.name = "levels",
-                               .text = "&Levels as colours",
-                               .tip = "The level at which each vertex is added",
-                               .keys = "Shift+3",
-                               .choice = "Levels",
-                               .key = level_key,
-                               .work = level_work,
-                               .legend = {.title = "Level at which a vertex comes in", .whole = true}};
+const Coloring kLevelColors = {
+    "levels",  "&Levels as colours", "The level at which each vertex is added",        "Shift+3", "Levels",
+    level_key, level_work,           {"Level at which a vertex comes in", "", 1, true}};
 
-const Coloring kPatchColors = {.name = "patches",
-                               .text = "Patc&hes as colours",
-                               .tip = "The patches of regular quads, each in a colour unlike its neighbours'",
-                               .keys = "Shift+4",
-                               .choice = "Patches",
-                               .needs = {.patches = true},
-                               .why_not = why_no_patches};
+const Coloring kPatchColors = {"patches",
+                               "Patc&hes as colours",
+                               "The patches of regular quads, each in a colour unlike its neighbours'",
+                               "Shift+4",
+                               "Patches",
+                               nullptr,
+                               nullptr,
+                               {},
+                               {.patches = true},
+                               why_no_patches};
 
-const Coloring kExpectedErrorColors = {.name = "expected",
-                                       .text = "E&xpected error as colours",
-                                       .tip = "Where the pose is more curved than the driver can follow",
-                                       .keys = "Shift+5",
-                                       .choice = "Expected error",
-                                       .needs = {.expected_error = true},
-                                       .key = expected_error_key,
-                                       .work = expected_error_work,
-                                       .legend = {"Expected error", kPerDiagonal, 100},
-                                       .why_not = why_no_expected_error};
+const Coloring kExpectedErrorColors = {"expected",
+                                       "E&xpected error as colours",
+                                       "Where the pose is more curved than the driver can follow",
+                                       "Shift+5",
+                                       "Expected error",
+                                       expected_error_key,
+                                       expected_error_work,
+                                       {"Expected error", kPerDiagonal, 100},
+                                       {.expected_error = true},
+                                       why_no_expected_error};
 
-const Coloring kPieceColors = {.name = "pieces",
-                               .text = "Pi&eces as colours",
-                               .tip = "Each piece of a mesh that breaks",
-                               .keys = "Shift+6",
-                               .choice = "Pieces",
-                               .key = piece_key,
-                               .work = piece_work};
+const Coloring kPieceColors = {
+    "pieces", "Pi&eces as colours", "Each piece of a mesh that breaks", "Shift+6", "Pieces", piece_key, piece_work};
 
-const Coloring kHeatColors = {.name = "heat",
-                              .text = "&Heat as colours",
-                              .tip = "How warm a body that melts is",
-                              .keys = "Shift+7",
-                              .choice = "Heat",
-                              .needs = {.temperatures = true},
-                              .key = heat_key,
-                              .work = heat_work,
-                              .legend = {"Temperature", "°C", 1, true},
-                              .why_not = why_no_heat};
+const Coloring kHeatColors = {"heat",
+                              "&Heat as colours",
+                              "How warm a body that melts is",
+                              "Shift+7",
+                              "Heat",
+                              heat_key,
+                              heat_work,
+                              {"Temperature", "°C", 1, true},
+                              {.temperatures = true},
+                              why_no_heat};
 
 const std::vector<const Coloring*>& colorings() {
     static const std::vector<const Coloring*> all = [] {

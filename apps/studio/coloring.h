@@ -2,7 +2,7 @@
 #pragma once
 
 #include "overlay.h"
-#include "vertex_colors.h"
+#include "shown_model.h"
 #include "workbench.h"
 
 namespace filigree::studio {
@@ -19,13 +19,8 @@ struct Seen {
     std::string patches_problem;     ///< why patches are not seen; "" when they are
 };
 
-/// What colours are made of: they are made again when another key is wanted.
-struct ColorKey {
-    std::shared_ptr<const void> of; ///< never null
-    std::uint64_t number = 0;
-    bool is_measured = false;
-    bool operator==(const ColorKey&) const = default;
-};
+/// What colours are made of, and a number: they are made again when another key is wanted.
+using ColorKey = std::pair<std::shared_ptr<const void>, std::uint64_t>;
 
 struct ColorWork {
     std::function<Result<VertexColors>(const RunContext&)> work;
@@ -48,11 +43,11 @@ struct Coloring {
     const char* name; ///< of its action, after "view.color_"
     const char *text, *tip, *keys;
     const char* choice; ///< in the panel
-    ColoringNeeds needs = {};
     /// None: there are no colours now. Null: there never are.
     std::optional<ColorKey> (*key)(const Seen& seen) = nullptr;
     ColorWork (*work)(const Seen& seen) = nullptr; ///< called when there is a key
     LegendWords legend = {};
+    ColoringNeeds needs = {};
     QString (*why_not)(const Seen& seen) = nullptr; ///< a sentence while the colours are not there; "" while they are
 };
 

@@ -32,20 +32,11 @@ Mesh moved_mesh(const Mesh& mesh, std::span<const Vec3f> positions) {
 
 using BodyShown = std::shared_ptr<const DroppedBody>;
 
-struct ParticlesKey {
-    BodyShown body;
-    std::uint64_t moment = 0;
-    bool operator==(const ParticlesKey&) const = default;
-};
 struct Particles {
     BodyShown body;
     Drawable drawable;
 };
 
-struct InsideKey {
-    std::uint64_t samples = 0, model = 0;
-    bool operator==(const InsideKey&) const = default;
-};
 struct InsidePoints {
     Drawable drawable;
     std::uint64_t pose = 0; ///< which pose they have; 0: at rest
@@ -57,26 +48,12 @@ struct Melt {
     std::uint64_t colors = 0;  ///< which colours it has; 0: none
 };
 
-struct ColorsKey {
-    const Coloring* coloring = nullptr;
-    std::uint64_t model = 0;
-    ColorKey key;
-    bool operator==(const ColorsKey&) const = default;
-};
-
-/// The driver's edges over the mesh: drawn nearer to the eye than they are.
-struct NetKey {
-    std::uint64_t model = 0, pose = 0;
-    Vec3d eye = Vec3d::Zero();
-    double offset = 0;
-    bool operator==(const NetKey&) const = default;
-};
-
-struct PlacesKey {
-    std::shared_ptr<const LevelShape> shape;
-    std::uint64_t pose = 0;
-    bool operator==(const PlacesKey&) const = default;
-};
+using Stamp = std::uint64_t; ///< of a pose, a model ...: another number with each of them
+using ParticlesKey = std::pair<BodyShown, Stamp>;
+using InsideKey = std::pair<Stamp, Stamp>; ///< of the samples, the model
+using ColorsKey = std::tuple<const Coloring*, Stamp, ColorKey>;
+using NetKey = std::tuple<Stamp, Stamp, std::array<double, 3>, double>; ///< of the model, the pose; the eye; the offset
+using PlacesKey = std::pair<std::shared_ptr<const LevelShape>, Stamp>;
 
 } // namespace
 
@@ -93,8 +70,8 @@ struct DrawnObjects::Things {
     Shown<std::shared_ptr<const Mesh>, Melt> melt;
     Shown<std::shared_ptr<const Mesh>, std::vector<Triangle>> melt_triangles;
     Shown<BodyShown, std::vector<Drawable>> obstacles;
-    Shown<std::uint64_t, Drawable> full;        ///< of a pose
-    Shown<std::uint64_t, PatchSurface> patches; ///< of a model
+    Shown<Stamp, Drawable> full;        ///< of a pose
+    Shown<Stamp, PatchSurface> patches; ///< of a model
     Shown<std::shared_ptr<const Model>, std::vector<DefectEdge>> defects;
     Shown<ColorsKey, VertexColors> colors;
     Shown<NetKey, Pose> net;
@@ -102,37 +79,29 @@ struct DrawnObjects::Things {
 };
 
 DrawnObjects::DrawnObjects(Workbench& workbench, Workshop::WithOpenGl with_opengl)
-    : workbench_(workbench), shop_{std::move(with_opengl),
-                                   [this] {
-                                       follow();
-                                       Q_EMIT changed(false);
-                                   }},
+    : workbench_(workbench), shop_{std::move(with_opengl), [this] { follow_and_draw(); }},
       settings_(workbench.view().settings()) {
-    const auto follow_and_draw = [this] {
-        follow();
-        Q_EMIT changed(false);
-    };
     connect(&shop_.background, &Jobs::failed, this, [this](const Error& error) {
         problem_ = error.message;
         Q_EMIT changed(false);
     });
-    connect(&workbench.document(), &Document::changed, this, [this] { follow_document(); });
-    connect(&workbench, &Workbench::opened, this, [this] { follow_document(); });
-    connect(&workbench, &Workbench::pose_changed, this, [this] { follow_pose(); });
-    connect(&workbench, &Workbench::full_changed, this, [this] { follow(); });
-    connect(&workbench, &Workbench::error_measured, this, [this] { follow(); });
+    connect(&workbench.document(), &Document::changed, this, &DrawnObjects::follow_document);
+    connect(&workbench, &Workbench::opened, this, &DrawnObjects::follow_document);
+    connect(&workbench, &Workbench::pose_changed, this, &DrawnObjects::follow_pose);
+    connect(&workbench, &Workbench::full_changed, this, &DrawnObjects::follow);
+    connect(&workbench, &Workbench::error_measured, this, &DrawnObjects::follow);
     connect(&workbench, &Workbench::inside_points_ready, this, [this] {
         samples_stamp_ = next_stamp();
         follow();
     });
-    connect(&workbench, &Workbench::mode_changed, this, follow_and_draw);
-    connect(&workbench.playback(), &Playback::state_changed, this, follow_and_draw);
+    connect(&workbench, &Workbench::mode_changed, this, &DrawnObjects::follow_and_draw);
+    connect(&workbench.playback(), &Playback::state_changed, this, &DrawnObjects::follow_and_draw);
     connect(&workbench.playback(), &Playback::moved, this, [this] {
         moment_stamp_ = next_stamp();
         follow();
     });
-    connect(&workbench.expected_error(), &ExpectedError::changed, this, [this] { follow(); });
-    connect(&workbench.view(), &ViewState::changed, this, follow_and_draw);
+    connect(&workbench.expected_error(), &ExpectedError::changed, this, &DrawnObjects::follow);
+    connect(&workbench.view(), &ViewState::changed, this, &DrawnObjects::follow_and_draw);
 }
 
 DrawnObjects::~DrawnObjects() = default;
@@ -140,8 +109,7 @@ DrawnObjects::~DrawnObjects() = default;
 void DrawnObjects::start(RestoreOn where) {
     things_ = std::make_unique<Things>(shop_, where);
     follow_document();
-    follow();
-    Q_EMIT changed(false);
+    follow_and_draw();
 }
 
 void DrawnObjects::stop() {
@@ -174,8 +142,7 @@ void DrawnObjects::follow_document() {
             adopt();
         });
     }
-    follow();
-    Q_EMIT changed(false);
+    follow_and_draw();
 }
 
 /// The model that was prepared is drawn from now on.
@@ -188,8 +155,7 @@ void DrawnObjects::adopt() {
     pose_ = things_->model->rest_pose();
     pose_stamp_ = 0;
     follow_pose();
-    follow(); // where the pose is not of this model
-    Q_EMIT changed(false);
+    follow_and_draw(); // where the pose is not of this model
 }
 
 void DrawnObjects::follow_pose() {
@@ -203,7 +169,7 @@ void DrawnObjects::follow_pose() {
     Q_EMIT changed(true);
 }
 
-/// Everything but the model: whatever has changed, what is made of other things than before is made again.
+/// Everything but the model: what is made of other things than before is made again, whatever has changed.
 void DrawnObjects::follow() {
     if (!things_) return;
     settings_ = workbench_.view().settings();
@@ -226,20 +192,22 @@ void DrawnObjects::follow() {
     if (moves || is_other) Q_EMIT changed(moves);
 }
 
-bool DrawnObjects::wants_particles() const {
-    return settings_.particles && workbench_.mode() == Mode::body && workbench_.playback().has_body();
+void DrawnObjects::follow_and_draw() {
+    follow();
+    Q_EMIT changed(false);
 }
 
 bool DrawnObjects::show_particles() {
     const Moment* moment = workbench_.playback().moment();
-    const bool are_there = wants_particles() && moment && !moment->particles.empty();
+    const bool are_there =
+        settings_.particles && workbench_.mode() == Mode::body && moment && !moment->particles.empty();
     const ParticlesKey key = are_there ? ParticlesKey{workbench_.playback().made(), moment_stamp_} : ParticlesKey();
     return things_->particles.update(key, [&](std::optional<Particles> before) -> Result<Particles> {
-        if (before && before->body == key.body && before->drawable.set_positions(moment->particles))
+        if (before && before->body == key.first && before->drawable.set_positions(moment->particles))
             return std::move(*before);
         Result<Drawable> made = Drawable::points(moment->particles, origin(), {}, RunContext());
         if (!made) return made.error();
-        return Particles{key.body, std::move(made).value()};
+        return Particles{key.first, std::move(made).value()};
     });
 }
 
@@ -312,7 +280,7 @@ bool DrawnObjects::has_full_vertices() const {
 
 /// The full deformation is drawn for the pose shown, or not at all.
 bool DrawnObjects::show_full() {
-    const std::uint64_t key = settings_.split && has_full_vertices() ? pose_stamp_ : 0;
+    const Stamp key = settings_.split && has_full_vertices() ? pose_stamp_ : 0;
     const auto plan = [this] {
         const std::span<const Vec3f> full = workbench_.full();
         return [model = shown()->shared_model(), source = workbench_.state().source,
@@ -338,7 +306,7 @@ std::string DrawnObjects::full_problem() const {
 
 /// The finest level in the colours of its patches.
 bool DrawnObjects::show_patches() {
-    const std::uint64_t key = settings_.coloring->needs.patches ? model_stamp_ : 0;
+    const Stamp key = settings_.coloring->needs.patches ? model_stamp_ : 0;
     const auto plan = [this] {
         const auto& quads = workbench_.state().source->quads;
         const unsigned most_levels = quads ? quads->report.levels : std::numeric_limits<unsigned>::max();
@@ -402,7 +370,7 @@ bool DrawnObjects::show_colors() {
     const ColorsKey& before = colors.made_of();
     return colors.update_later(
         key, [&] { return std::move(work.work); }, [](VertexColors made) -> Result<VertexColors> { return made; },
-        before.coloring == key.coloring && before.model == key.model);
+        std::get<0>(before) == std::get<0>(key) && std::get<1>(before) == std::get<1>(key));
 }
 
 const VertexColors& DrawnObjects::colors() const {
@@ -499,7 +467,7 @@ void DrawnObjects::pose_net() {
     constexpr double kUnmeasured = 0.01, kMost = 0.05; // of the diagonal
     const double diagonal = bounds(model.rest_pose().positions).diagonal();
     const double offset = std::min(2 * model.facts()[0].deviation.value_or(kUnmeasured * diagonal), kMost * diagonal);
-    const NetKey key{model_stamp_, pose_stamp_, camera.eye, offset};
+    const NetKey key{model_stamp_, pose_stamp_, {camera.eye.x(), camera.eye.y(), camera.eye.z()}, offset};
     things_->net.update(key, [&](const auto&) -> Result<Pose> {
         const Vec3f eye = (camera.eye - origin()).cast<float>(), back = camera.basis().col(2).cast<float>();
         Pose near = pose_;

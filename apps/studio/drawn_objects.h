@@ -80,6 +80,7 @@ private:
     void follow_document();
     void follow_pose();
     void follow();
+    void follow_and_draw();
     void adopt();
     bool show_particles();
     bool show_obstacles();
@@ -93,7 +94,6 @@ private:
     void pose_inside_points();
     void pose_net();
     bool has_full_vertices() const;
-    bool wants_particles() const;
     std::string patches_problem() const;
     PatchSurface* patches_at(unsigned level); ///< what is drawn in its place; null: itself
     void ask_for(unsigned level, bool is_urgent);

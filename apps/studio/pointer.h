@@ -1,7 +1,7 @@
 // The mouse over the picture: the left button is the tool's; what the tool leaves turns and moves the camera.
 #pragma once
 
-#include "tools/gizmo.h"
+#include "tools/tool.h"
 
 #include <QMouseEvent>
 
@@ -34,7 +34,7 @@ private:
     /// moved: pixels since the last move.
     using CameraDrag = void (*)(ViewState& view, const QPointF& moved, const PictureSize& size);
 
-    std::array<Tool*, 2> hand() const { return {&knobs_, tool_.get()}; } ///< first who is asked first
+    std::array<Tool*, 2> hand() const { return {knobs_.get(), tool_.get()}; } ///< first who is asked first
     void take_up();
     void press_left(const QMouseEvent& event);
     void update_hover();
@@ -44,7 +44,7 @@ private:
 
     ToolContext context_;
     QWidget& widget_;
-    mutable GizmoTool knobs_{context_};
+    std::unique_ptr<Tool> knobs_ = make_gizmo(context_);
     const ToolEntry* entry_ = nullptr; ///< of the tool in hand
     std::unique_ptr<Tool> tool_;       ///< the view's; during a drag, the one that it began with
     Tool* held_ = nullptr;             ///< that is dragged

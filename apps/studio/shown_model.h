@@ -4,12 +4,19 @@
 
 #include "document.h"
 #include "jobs.h"
-#include "vertex_colors.h"
 
 #include "filigree/present/level_shape.h"
 #include "filigree/render.h"
 
 namespace filigree::studio {
+
+/// Numbers of vertices to be shown as colours.
+struct VertexColors {
+    std::vector<float> values; ///< one a vertex
+    ColorMap map = ColorMap::sequential;
+    ValueRange range = {};
+    std::shared_ptr<const Mesh> melt = {}; ///< whose vertices they are; null: the model's, at its finest level
+};
 
 /// One level in graphics memory. Lives and dies with the OpenGL context current.
 struct ShownLevel {

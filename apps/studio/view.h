@@ -12,20 +12,20 @@ namespace filigree::studio {
 
 enum class SurfaceStyle { shaded, edges, wireframe };
 
-struct Coloring; ///< coloring.h
+struct Coloring;
 extern const Coloring kOwnColors;
-struct ToolEntry; ///< tools/tool.h
+struct ToolEntry;
 extern const ToolEntry kPullTool;
 
 struct ViewSettings {
     SurfaceStyle style = SurfaceStyle::shaded;
-    const Coloring* coloring = &kOwnColors;
-    const ToolEntry* tool = &kPullTool;
-    bool split = false;         ///< driver | restored | full deformation
-    bool driver = false;        ///< the driver's edges over the mesh
-    bool defects = false;       ///< open and non-manifold edges marked
-    bool particles = false;     ///< the body's, instead of its surface
-    bool inside_points = false; ///< points inside the mesh at rest
+    const Coloring* coloring = &kOwnColors; ///< one of colorings()
+    const ToolEntry* tool = &kPullTool;     ///< one of kTools
+    bool split = false;                     ///< driver | restored | full deformation
+    bool driver = false;                    ///< the driver's edges over the mesh
+    bool defects = false;                   ///< open and non-manifold edges marked
+    bool particles = false;                 ///< the body's, instead of its surface
+    bool inside_points = false;             ///< points inside the mesh at rest
     std::size_t inside_count = 3000;
     double apart = 0; ///< of the pieces of a mesh that breaks: how far each is moved, times its way from the middle
     bool clip = false;

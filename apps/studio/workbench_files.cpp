@@ -223,7 +223,7 @@ void Workbench::open_whole(const std::string& path, std::shared_ptr<const Source
             return state;
         },
         [this, path, look, id = document_.state_id()](State state) {
-            if (is_pulling_) end_pull();
+            if (is_pulling()) end_pull();
             pause();
             const State& now = this->state();
             const bool is_warped_look = look && now.source == look && now.handles.empty() && !now.recording;
@@ -244,12 +244,11 @@ void Workbench::open_whole(const std::string& path, std::shared_ptr<const Source
 }
 
 void Workbench::replace_document(State state) {
-    if (is_pulling_) end_pull();
+    if (is_pulling()) end_pull();
     pause();
     frame_ = 0;
-    impl_->is_opening = true;
     document_.replace(std::move(state));
-    impl_->is_opening = false;
+    Q_EMIT opened();
 }
 
 void Workbench::save(const QString& title, const std::string& path,

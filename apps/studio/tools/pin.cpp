@@ -70,14 +70,14 @@ private:
 
 } // namespace
 
-const ToolEntry kPinTool = {.name = "pin",
-                            .text = "Pi&n",
-                            .tip = "Click or paint the surface to pin it; with Ctrl to take pins out",
-                            .keys = "N",
-                            .icon = {{StrokeKind::ellipse, {8, 5.2, 3.2}},
-                                     {StrokeKind::line, {8, 8.4, 8, 13.6}},
-                                     {StrokeKind::line, {4.5, 13.6, 11.5, 13.6}}},
-                            .gestures = {{"drag the surface", "pins it"}, {"Ctrl+drag", "takes pins out"}},
-                            .make = make_tool<PinTool>};
+const ToolEntry kPinTool = {"pin",
+                            "Pi&n",
+                            "Click or paint the surface to pin it; with Ctrl to take pins out",
+                            "N",
+                            {{StrokeKind::ellipse, {8, 5.2, 3.2}},
+                             {StrokeKind::line, {8, 8.4, 8, 13.6}},
+                             {StrokeKind::line, {4.5, 13.6, 11.5, 13.6}}},
+                            {{"drag the surface", "pins it"}, {"Ctrl+drag", "takes pins out"}},
+                            make_tool<PinTool>};
 
 } // namespace filigree::studio

@@ -59,15 +59,14 @@ private:
 
 } // namespace
 
-const ToolEntry kPullTool = {.name = "pull",
-                             .text = "&Pull",
-                             .tip = "Drag the surface to pull it",
-                             .keys = "P",
-                             // a surface that follows an arrow
-                             .icon = {{StrokeKind::curve, {1.5, 13, 6, 13, 6, 8.5, 8, 8.5, 10, 8.5, 10, 13, 14.5, 13}},
-                                      {StrokeKind::line, {8, 6.2, 8, 1.8}},
-                                      {StrokeKind::head, {8, 1.6, 90, 3.4}}},
-                             .gestures = {{"drag the surface", "pulls it"}},
-                             .make = make_tool<PullTool>};
+const ToolEntry kPullTool = {"pull",
+                             "&Pull",
+                             "Drag the surface to pull it",
+                             "P",
+                             {{StrokeKind::curve, {1.5, 13, 6, 13, 6, 8.5, 8, 8.5, 10, 8.5, 10, 13, 14.5, 13}},
+                              {StrokeKind::line, {8, 6.2, 8, 1.8}},
+                              {StrokeKind::head, {8, 1.6, 90, 3.4}}},
+                             {{"drag the surface", "pulls it"}},
+                             make_tool<PullTool>};
 
 } // namespace filigree::studio

@@ -44,7 +44,7 @@ private:
     mutable std::optional<std::optional<Picked>> surface_;
 };
 
-/// Of press(), move() and release() or cancel() there is one drag at a time.
+/// A drag is press(), then move() any number of times, then release() or cancel().
 class Tool {
 public:
     explicit Tool(const ToolContext& context) : context_(context) {}
@@ -54,25 +54,29 @@ public:
     virtual bool press(const Hit& hit) = 0;
     virtual void move(const Hit&) {}
     virtual void release() {}
-    /// In place of release(): the drag leaves nothing. Also when the model it is of has gone.
+    /// In place of release(): the drag leaves nothing. Also called when another model has taken the dragged one's
+    /// place.
     virtual void cancel() {}
 
     /// While the button is up: whether press() would take hold of something here.
     virtual bool hover(const Hit& hit) { return !context_.workbench.is_playing() && hit.surface(); }
     /// A double click is a second press; else it looks at that point.
     virtual bool takes_double_clicks() const { return false; }
-    /// Of the circle around the mouse, model units; 0: none.
+    /// Radius of the circle around the mouse, model units; 0: no circle.
     virtual double radius() const { return 0; }
     /// is_held: during a drag; else the mouse is over what press() would take hold of.
-    virtual Qt::CursorShape cursor(bool is_held) const;
-    /// What the tool shows over the picture. is_hot: as for cursor(), or held.
-    virtual void draw(OverlayContent& content, bool is_hot) const;
+    virtual Qt::CursorShape cursor(bool /*is_held*/) const { return Qt::CrossCursor; }
+    /// What the tool shows over the picture. is_hot: the mouse is over what press() would take hold of, or drags it.
+    virtual void draw(OverlayContent&, bool /*is_hot*/) const {}
 
 protected:
     Workbench& workbench() const { return context_.workbench; }
     const ViewSettings& settings() const { return context_.workbench.view().settings(); }
-    /// Of the circle that pulls and pins have, model units.
-    double grip() const;
+    /// Radius of pulls and pins, model units.
+    double grip() const {
+        const auto& source = workbench().state().source;
+        return source ? settings().grip * source->box.diagonal() : 0;
+    }
 
     const ToolContext& context_;
 };
@@ -100,5 +104,8 @@ std::unique_ptr<Tool> make_tool(const ToolContext& context) {
 
 extern const ToolEntry kPullTool, kPinTool, kTurnTool, kTorchTool;
 inline constexpr std::array kTools = {&kPullTool, &kPinTool, &kTurnTool, &kTorchTool};
+
+/// The knobs of the deformations: no tool of the table, but there with some of them.
+std::unique_ptr<Tool> make_gizmo(const ToolContext& context);
 
 } // namespace filigree::studio

@@ -39,17 +39,16 @@ private:
 
 } // namespace
 
-const ToolEntry kTorchTool = {.name = "torch",
-                              .text = "&Torch",
-                              .tip = "Hold the mouse on a body that melts to warm it; with Ctrl to cool",
-                              .keys = "H",
-                              // a flame over its handle
-                              .icon = {{StrokeKind::curve, {8,  1.5, 9,  4, 12, 5.5, 12,  8.5, 12,  11,  10, 12, 8,
-                                                            12, 6,   12, 4, 11, 4,   8.5, 4,   6.5, 6.5, 5,  8,  1.5}},
-                                       {StrokeKind::line, {8, 12, 8, 15}},
-                                       {StrokeKind::line, {6, 15, 10, 15}}},
-                              .gestures = {{"hold the surface", "warms a body that melts; with Ctrl: cools it"}},
-                              .make = make_tool<TorchTool>,
-                              .colors = &kHeatColors};
+const ToolEntry kTorchTool = {"torch",
+                              "&Torch",
+                              "Hold the mouse on a body that melts to warm it; with Ctrl to cool",
+                              "H",
+                              {{StrokeKind::curve, {8,  1.5, 9,  4, 12, 5.5, 12,  8.5, 12,  11,  10, 12, 8,
+                                                    12, 6,   12, 4, 11, 4,   8.5, 4,   6.5, 6.5, 5,  8,  1.5}},
+                               {StrokeKind::line, {8, 12, 8, 15}},
+                               {StrokeKind::line, {6, 15, 10, 15}}},
+                              {{"hold the surface", "warms a body that melts; with Ctrl: cools it"}},
+                              make_tool<TorchTool>,
+                              &kHeatColors};
 
 } // namespace filigree::studio

@@ -14,16 +14,16 @@ public:
 
 } // namespace
 
-const ToolEntry kTurnTool = {.name = "turn",
-                             .text = "&Turn",
-                             .tip = "Drag anywhere to turn the view",
-                             .keys = "T",
-                             .icon = {{StrokeKind::ellipse, {8, 8, 2.2}},
-                                      {StrokeKind::arc, {2, 2, 12, 12, 20, 130}},
-                                      {StrokeKind::arc, {2, 2, 12, 12, 200, 130}},
-                                      {StrokeKind::head, {13.7, 6, 290, 3.2}},
-                                      {StrokeKind::head, {2.3, 10, 110, 3.2}}},
-                             .gestures = {},
-                             .make = make_tool<TurnTool>};
+const ToolEntry kTurnTool = {"turn",
+                             "&Turn",
+                             "Drag anywhere to turn the view",
+                             "T",
+                             {{StrokeKind::ellipse, {8, 8, 2.2}},
+                              {StrokeKind::arc, {2, 2, 12, 12, 20, 130}},
+                              {StrokeKind::arc, {2, 2, 12, 12, 200, 130}},
+                              {StrokeKind::head, {13.7, 6, 290, 3.2}},
+                              {StrokeKind::head, {2.3, 10, 110, 3.2}}},
+                             {},
+                             make_tool<TurnTool>};
 
 } // namespace filigree::studio
