@@ -1,10 +1,8 @@
-#include "chunks.h"
 #include "commands.h"
 #include "session.h"
 #include "spill.h"
 
 #include "filigree/deform/fidelity.h"
-#include "filigree/io/shared_strip.h"
 
 #include <filesystem>
 
@@ -17,7 +15,7 @@ namespace {
 struct StripCommandOptions {
     std::string input, output, driver;
     StripOptions strip;
-    std::string memory, chunk;
+    std::string memory;
     std::optional<double> fidelity;
     PoseSource fidelity_from = PoseSource::positions;
 };
@@ -95,49 +93,11 @@ void bound_memory(const StripCommandOptions& options) {
                                           options.memory + "; give no --memory, or write to another disk.");
 }
 
-/// Makes the model together with other processes.
-void strip_chunk(const StripCommandOptions& options, Session& session) {
-    WorkChunk chunk = chunk_of(options.chunk);
-    if (options.input == "-" || options.output == "-")
-        refuse("--chunk reads and writes files by their names, which other processes use too; '-' has none.");
-    if (options.strip.code != DetailCode::blend) refuse("--chunk is for the blend code: leave out --code reference.");
-    check_folder_of(options.output);
-    const double start = now_seconds();
-    const std::vector<std::filesystem::path> mesh{options.input};
-    chunk.job = require(hash_of_files(mesh)) + '\n' +
-                session.settings_but({"mesh", "--output", "--chunk", "--memory", "--threads", "--quiet", "--json"});
-    const SharedStrip strip{.path = options.output, .options = options.strip, .read = [&]() -> Result<Mesh> {
-                                return session.read_mesh(options.input);
-                            }};
-    session.begin_writing(options.output);
-    const SharedStripReport made = require(strip_in_chunks(strip, chunk, session.context()));
-    const double seconds = now_seconds() - start;
-    Report report;
-    report.say(made.tasks == 0
-                   ? fmt::format("{}: was made before\n", options.output)
-                   : fmt::format("{}: chunk {} of {}: {} of {} tasks made in {}, of which {} waiting for others\n",
-                                 options.output, chunk.number, chunk.count, made.made, made.tasks,
-                                 seconds_text(seconds), seconds_text(made.waited)));
-    report.set("output", options.output);
-    report.set("chunk", chunk.number);
-    report.set("chunks", chunk.count);
-    report.set("made", made.made);
-    report.set("tasks", made.tasks);
-    report.set("waited", made.waited);
-    report.set("is_whole", true);
-    report.set("seconds", seconds);
-    Json steps = Json::object();
-    for (const auto& [step, took] : made.step_seconds) steps[step] = took;
-    report.set("step_seconds", steps);
-    session.print(report);
-}
-
 void run(const StripCommandOptions& options, Session& session) {
     refuse_mesh_name(options.output);
     bound_memory(options);
     if (!options.fidelity && !session.first_given({"--fidelity-from"}).empty())
         refuse("--fidelity-from belongs to --fidelity.");
-    if (!options.chunk.empty()) return strip_chunk(options, session);
     const double start = now_seconds();
     Mesh mesh = session.read_mesh(options.input);
     const double read = now_seconds();
@@ -216,13 +176,6 @@ Command strip_command() {
                         "How much its arrays may take, such as 8G; the others lie in a file beside the output while it "
                         "runs (unset: three quarters of what is free)")
                      .named("SIZE"),
-                 Option("--one-piece", strip.one_piece,
-                        "Levels of more vertices are made in clusters, on all threads; the others in one piece")
-                     .whole_from(1)
-                     .with_default(),
-                 Option("--chunk", options->chunk,
-                        "K/N: be the K-th of N processes, on any machines, that make the model together")
-                     .excludes({"--driver", "--fidelity"}),
                  Option("--references", strip.references, "Of the reference code: coarse points that a point refers to")
                      .one_of({"3", "4", "6"})
                      .with_default()},
@@ -230,7 +183,6 @@ Command strip_command() {
                         "  filigree strip scan.ply -o scan.fil --base 5000 --precision int16\n"
                         "  filigree strip scan.ply -o scan.fil --fidelity 1e-5\n"
                         "  filigree strip scan.ply -o scan.fil --driver cage.obj\n"
-                        "  filigree strip scan.ply -o scan.fil --chunk 3/40\n"
                         "  filigree strip cube.obj -o cube.fil --code reference",
             .run = [options](Session& session) { run(*options, session); }};
 }
