@@ -1,4 +1,5 @@
 #include "commands.h"
+#include "reference.h"
 #include "session.h"
 #include "spill.h"
 
@@ -15,6 +16,8 @@ namespace {
 struct StripCommandOptions {
     std::string input, output, driver;
     StripOptions strip;
+    bool with_reference_code = false;
+    unsigned references = 3;
     std::string memory;
     std::optional<double> fidelity;
     PoseSource fidelity_from = PoseSource::positions;
@@ -98,6 +101,11 @@ void run(const StripCommandOptions& options, Session& session) {
     bound_memory(options);
     if (!options.fidelity && !session.first_given({"--fidelity-from"}).empty())
         refuse("--fidelity-from belongs to --fidelity.");
+    if (options.with_reference_code) {
+        ReferenceOptions reference{.references = options.references, .base = options.strip.base};
+        if (options.strip.levels) reference.max_levels = *options.strip.levels;
+        return strip_with_reference_code(options.input, options.output, reference, session);
+    }
     const double start = now_seconds();
     Mesh mesh = session.read_mesh(options.input);
     const double read = now_seconds();
@@ -131,60 +139,60 @@ void run(const StripCommandOptions& options, Session& session) {
 Command strip_command() {
     const auto options = std::make_shared<StripCommandOptions>();
     StripOptions& strip = options->strip;
-    return {.name = "strip",
-            .text = "Take the detail off a mesh: make a model with a light driver",
-            .options =
-                {Option("mesh", options->input, "Mesh to strip").is_read().required(),
-                 output_option(options->output, "Model file to write (.fil)"),
-                 Option("--base", strip.base, "Vertices of the driver (unset: 1,000, fewer for small meshes)")
-                     .whole_from(3)
-                     .excludes({"--levels", "--error", "--fidelity"}),
-                 Option("--driver", options->driver,
-                        "Mesh to bind to, made elsewhere: its vertices are the driver's; restored meshes have them "
-                        "behind their own")
-                     .is_read()
-                     .excludes({"--base", "--levels", "--error", "--fidelity", "--fidelity-from", "--max-edge",
-                                "--code", "--references"}),
-                 Option("--levels", strip.levels, "Levels to remove, each leaves a quarter of the vertices")
-                     .whole_from(1)
-                     .excludes({"--error", "--fidelity"}),
-                 Option("--error", strip.error, "How far the driver may leave the mesh (rms), fraction of the diagonal")
-                     .above_zero()
-                     .excludes({"--fidelity"}),
-                 Option("--fidelity", options->fidelity,
-                        "Smallest driver that restores bends, twists, tapers and random warps to this rms error, "
-                        "fraction of the diagonal")
-                     .above_zero(),
-                 choice<PoseSource>("--fidelity-from", options->fidelity_from,
-                                    {{"positions", PoseSource::positions}, {"gradients", PoseSource::gradients}},
-                                    "What poses will come with: positions (default) or gradients too"),
-                 Option("--max-edge", strip.max_edge,
-                        "Longest edge that simplifying may leave, fraction of the diagonal: flat parts keep "
-                        "vertices")
-                     .above_zero(),
-                 choice<DetailCode>("--code", strip.code,
-                                    {{"blend", DetailCode::blend}, {"reference", DetailCode::reference}},
-                                    "blend: any mesh (default); reference: the report's, for regular quads"),
-                 choice<Precision>("--precision", strip.precision,
-                                   {{"float", Precision::float32}, {"int16", Precision::int16}},
-                                   "Of the blend code: float, 20 bytes a vertex (default), or int16, 10 bytes"),
-                 Option("--reorder", strip.reorder,
-                        "Renumber vertices by where they are: a mesh whose order is hopeless restores faster; "
-                        "'restore --input-order' gives meshes in the old order")
-                     .excludes({"--driver"}),
-                 Option("--memory", options->memory,
-                        "How much its arrays may take, such as 8G; the others lie in a file beside the output while it "
-                        "runs (unset: three quarters of what is free)")
-                     .named("SIZE"),
-                 Option("--references", strip.references, "Of the reference code: coarse points that a point refers to")
-                     .one_of({"3", "4", "6"})
-                     .with_default()},
-            .examples = "  filigree strip scan.ply -o scan.fil\n"
-                        "  filigree strip scan.ply -o scan.fil --base 5000 --precision int16\n"
-                        "  filigree strip scan.ply -o scan.fil --fidelity 1e-5\n"
-                        "  filigree strip scan.ply -o scan.fil --driver cage.obj\n"
-                        "  filigree strip cube.obj -o cube.fil --code reference",
-            .run = [options](Session& session) { run(*options, session); }};
+    return {
+        .name = "strip",
+        .text = "Take the detail off a mesh: make a model with a light driver",
+        .options =
+            {Option("mesh", options->input, "Mesh to strip").is_read().required(),
+             output_option(options->output, "Model file to write (.fil)"),
+             Option("--base", strip.base, "Vertices of the driver (unset: 1,000, fewer for small meshes)")
+                 .whole_from(3)
+                 .excludes({"--levels", "--error", "--fidelity"}),
+             Option("--driver", options->driver,
+                    "Mesh to bind to, made elsewhere: its vertices are the driver's; restored meshes have them "
+                    "behind their own")
+                 .is_read()
+                 .excludes({"--base", "--levels", "--error", "--fidelity", "--fidelity-from", "--max-edge", "--code",
+                            "--references"}),
+             Option("--levels", strip.levels, "Levels to remove, each leaves a quarter of the vertices")
+                 .whole_from(1)
+                 .excludes({"--error", "--fidelity"}),
+             Option("--error", strip.error, "How far the driver may leave the mesh (rms), fraction of the diagonal")
+                 .above_zero()
+                 .excludes({"--fidelity"}),
+             Option("--fidelity", options->fidelity,
+                    "Smallest driver that restores bends, twists, tapers and random warps to this rms error, "
+                    "fraction of the diagonal")
+                 .above_zero(),
+             choice<PoseSource>("--fidelity-from", options->fidelity_from,
+                                {{"positions", PoseSource::positions}, {"gradients", PoseSource::gradients}},
+                                "What poses will come with: positions (default) or gradients too"),
+             Option("--max-edge", strip.max_edge,
+                    "Longest edge that simplifying may leave, fraction of the diagonal: flat parts keep "
+                    "vertices")
+                 .above_zero(),
+             choice<bool>("--code", options->with_reference_code, {{"blend", false}, {"reference", true}},
+                          "blend: any mesh (default); reference: the report's, for regular quads"),
+             choice<Precision>("--precision", strip.precision,
+                               {{"float", Precision::float32}, {"int16", Precision::int16}},
+                               "Of the blend code: float, 20 bytes a vertex (default), or int16, 10 bytes"),
+             Option("--reorder", strip.reorder,
+                    "Renumber vertices by where they are: a mesh whose order is hopeless restores faster; "
+                    "'restore --input-order' gives meshes in the old order")
+                 .excludes({"--driver"}),
+             Option("--memory", options->memory,
+                    "How much its arrays may take, such as 8G; the others lie in a file beside the output while it "
+                    "runs (unset: three quarters of what is free)")
+                 .named("SIZE"),
+             Option("--references", options->references, "Of the reference code: coarse points that a point refers to")
+                 .one_of({"3", "4", "6"})
+                 .with_default()},
+        .examples = "  filigree strip scan.ply -o scan.fil\n"
+                    "  filigree strip scan.ply -o scan.fil --base 5000 --precision int16\n"
+                    "  filigree strip scan.ply -o scan.fil --fidelity 1e-5\n"
+                    "  filigree strip scan.ply -o scan.fil --driver cage.obj\n"
+                    "  filigree strip cube.obj -o cube.fil --code reference",
+        .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

@@ -172,8 +172,6 @@ private:
                 .arg(with_commas(facts().vertices));
         if (shown && settings_.coloring == Coloring::patches && !drawn_.patches_problem().empty())
             return QString::fromStdString(drawn_.patches_problem());
-        if (shown && settings_.coloring == Coloring::expected_error && state.model->code() != DetailCode::blend)
-            return "The expected error is known for the blend code alone.";
         if (shown && settings_.coloring == Coloring::heat && drawn_.colors().values.empty())
             return "Heat is known of a body that melts while it moves: choose wax or ice in the Body panel.";
         if (!state.source) return {};

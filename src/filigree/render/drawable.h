@@ -78,9 +78,8 @@ public:
     static Result<Drawable> surface(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context);
     static Result<Drawable> points(std::span<const Vec3f> positions, const Vec3d& origin, const PointOptions& options,
                                    const RunContext& context);
-    /// A model at a level, restored by the vertex shader (reference models: on the CPU, then uploaded). Normals
-    /// belong to the rest shape and turn with the gradients. Starts unposed. The model must outlive the drawable, and
-    /// so must what the options point to.
+    /// A model at a level, restored by the vertex shader. Normals belong to the rest shape and turn with the gradients.
+    /// Starts unposed. The model must outlive the drawable, and so must what the options point to.
     static Result<Drawable> model(const Model& model, const RestoreOptions& restore, const SurfaceOptions& options,
                                   const RunContext& context);
     Drawable(Drawable&&) noexcept;
