@@ -224,8 +224,7 @@ void write_animation_output(const Model& model, const FrameSource<Pose>& poses, 
                             const AnimationOutput& output, const std::string& path, const std::string& materials_beside,
                             Session& session, Report& report) {
     const AnimationFormat format = require(animation_format(path));
-    const bool makes_skin =
-        output.glb == GlbMotion::skin || (output.glb == GlbMotion::automatic && model.code() == DetailCode::blend);
+    const bool makes_skin = output.glb != GlbMotion::morph;
     if (format == AnimationFormat::glb && makes_skin) {
         SkinOptions options = output.skin;
         if (output.no_normals) options.normals = ExportNormals::leave;

@@ -111,7 +111,7 @@ void run_demo(const DemoArguments& options, Session& session) {
         bench::median_seconds([&] { require(restorer.positions(pose, positions, context)); });
     const Mesh restored = require(restorer.mesh(pose, context));
     const MeshDistance with_gradients = require(mesh_distance(restored, full, 0, context));
-    const Mesh from_positions = require(restorer.mesh({pose.positions, {}, {}}, context));
+    const Mesh from_positions = require(restorer.mesh({pose.positions, {}}, context));
     const MeshDistance positions_only = require(mesh_distance(from_positions, full, 0, context));
 
     session.write_model(model, model_file);

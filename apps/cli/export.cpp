@@ -162,7 +162,6 @@ void export_page(const Model& model, const PoseSequence& own, ExportArguments op
     WebPage page(folder, fs::path(options.input).stem().string(), options.stream ? WebModel::stream : WebModel::glb);
     options.output = page.model_path();
     options.animation.skin.all_levels = true;
-    if (model.code() == DetailCode::reference) options.animation.glb = GlbMotion::morph;
     if (options.stream)
         export_stream(model, own, options, session, report);
     else

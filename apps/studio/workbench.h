@@ -74,8 +74,6 @@ public:
     void set_level(unsigned level, const std::string& merge = {});
     void remove_detail(); ///< one level coarser
     void add_detail();    ///< one level finer
-    void set_law(std::optional<HeightLaw> law);
-    void set_thin_shell(bool thin);
     // Deform
     void set_warps(const Warps& wanted, const std::string& merge = {});
     void reset_deformation(); ///< warps and handles

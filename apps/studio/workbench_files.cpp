@@ -40,13 +40,8 @@ Result<State> read_state(const std::string& path, const RunContext& context) {
         if (!model) return model.error();
         Result<PoseSequence> poses = read_poses(*bytes, path, context);
         if (!poses) return poses.error();
-        state.strip.code = model->code();
-        if (const auto* blend = std::get_if<BlendDetail>(&model->detail)) {
-            state.strip.base = model->driver().vertices.size();
-            state.strip.precision = blend->precision;
-        }
-        if (const auto* reference = std::get_if<ReferenceDetail>(&model->detail))
-            state.strip.references = reference->references;
+        state.strip.base = model->driver().vertices.size();
+        state.strip.precision = model->detail.precision;
         state.model = std::make_shared<const Model>(std::move(*model));
         if (poses->frames.size() == 1) { // a shape, not a motion
             state.handle_pose = std::make_shared<const Pose>(std::move(poses->frames[0]));
@@ -266,12 +261,7 @@ void Workbench::save(const QString& title, const std::string& path,
         });
 }
 
-std::vector<QString> Workbench::left_out_of_model() const {
-    std::vector<QString> result = lost_with_model(state());
-    if (state().restore.law) result.push_back("the law");
-    if (state().restore.thin_shell) result.push_back("thin shell");
-    return result;
-}
+std::vector<QString> Workbench::left_out_of_model() const { return lost_with_model(state()); }
 
 void Workbench::save_model(const std::string& path) {
     commit_recording();

@@ -125,15 +125,6 @@ void Workbench::remove_detail() {
 }
 void Workbench::add_detail() { change_level(state().level() + 1, "Add detail", {}); }
 
-void Workbench::set_law(std::optional<HeightLaw> law) {
-    const std::string name(law ? height_law_name(*law) : "as usual");
-    document_.edit("Law: " + QString::fromStdString(name), [&](State& next) { next.restore.law = law; });
-}
-
-void Workbench::set_thin_shell(bool thin) {
-    document_.edit(thin ? "Thin shell" : "Solid", [&](State& next) { next.restore.thin_shell = thin; });
-}
-
 const QuadRemeshOptions& Workbench::quad_options() const { return impl_->quad_options; }
 
 void Workbench::set_quad_options(const QuadRemeshOptions& options) {

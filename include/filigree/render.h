@@ -227,9 +227,8 @@ public:
                                     const RunContext& context = RunContext());
     static Result<Drawable> points(std::span<const Vec3f> positions, const Vec3d& origin,
                                    const PointOptions& options = {}, const RunContext& context = RunContext());
-    /// A model at a level, restored by the vertex shader (reference models: on the CPU, then uploaded). Normals
-    /// belong to the rest shape and turn with the gradients. Starts unposed. The model must outlive the drawable, and
-    /// so must what the options point to.
+    /// A level of a model; the vertex shader restores it. Normals belong to the rest shape and turn with the gradients.
+    /// It is at rest until set_pose. The model, and what the options point to, must outlive the drawable.
     static Result<Drawable> model(const Model& model, const RestoreOptions& restore, const SurfaceOptions& options = {},
                                   const RunContext& context = RunContext());
     Drawable(Drawable&&) noexcept;

@@ -3,6 +3,7 @@
 
 #include "filigree/hierarchy/strip.h"
 #include "filigree/io/model_file.h"
+#include "filigree/io/reference_file.h"
 #include "filigree/mesh/shapes.h"
 #include "threads.h"
 
@@ -56,9 +57,9 @@ protected:
         return ModelChunks::open(*FileReader::open(path("m.fil")), "m.fil", kTwoThreads);
     }
     /// By way of the whole mesh.
-    std::string whole(const PoseSequence& poses, const RestoreOptions& options = {}) {
+    std::string whole(const PoseSequence& poses) {
         const Model model = *read_model(path("m.fil"), kTwoThreads);
-        const Restorer restorer = *Restorer::create(model, options, kTwoThreads);
+        const Restorer restorer = *Restorer::create(model, {}, kTwoThreads);
         const Mesh rest = level_mesh(model, model.finest_level());
         const MeshAnimation animation{&rest, poses.frames.size(), 24, [&](std::size_t frame, std::span<Vec3f> out) {
                                           return restorer.positions(poses.frames[frame], out, kTwoThreads);
@@ -89,14 +90,10 @@ TEST_F(ModelChunksTest, RestoreTheSameBytesAsTheWhole) {
                 EXPECT_EQ(box.min, own.min);
                 EXPECT_EQ(box.max, own.max);
             }
-            for (const RestoreOptions& options :
-                 {RestoreOptions{}, RestoreOptions{.law = HeightLaw::keep, .thin_shell = true}}) {
-                const auto written =
-                    write_restored_chunks(*chunks, frames_of(poses), options, path("chunks.pc2"), kTwoThreads);
-                ASSERT_TRUE(written.ok()) << written.error().message;
-                EXPECT_TRUE(written->empty());
-                EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses, options));
-            }
+            const auto written = write_restored_chunks(*chunks, frames_of(poses), {}, path("chunks.pc2"), kTwoThreads);
+            ASSERT_TRUE(written.ok()) << written.error().message;
+            EXPECT_TRUE(written->empty());
+            EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses));
         }
 }
 
@@ -164,11 +161,10 @@ TEST_F(ModelChunksTest, DamageIsSeenWhereItIsRead) {
 }
 
 TEST_F(ModelChunksTest, WhatHasNoneIsRefused) {
-    const Stripped reference = *strip(make_wavy_cube({.resolution = 8}), {.code = DetailCode::reference}, kTwoThreads);
-    EXPECT_EQ(open(reference.model).error().code, ErrorCode::unsuitable);
-    const auto old =
-        ModelChunks::open(*FileReader::open(FILIGREE_ROOT "/tests/io/version_1/float.fil"), "a", kTwoThreads);
-    EXPECT_EQ(old.error().code, ErrorCode::unsuitable);
+    const std::string reference =
+        write_reference_model(*strip_to_reference(make_wavy_cube({.resolution = 8}), {}, kTwoThreads));
+    EXPECT_EQ(ModelChunks::open(FileReader(std::string_view(reference)), "a", kTwoThreads).error().code,
+              ErrorCode::unsuitable);
     const Model model = model_of(Precision::float32);
     const Result<ModelChunks> chunks = open(model);
     const PoseSequence poses = bent_poses(model, false);

@@ -283,7 +283,7 @@ TEST_F(PointCache, NumberedMeshesMustBeWhole) {
 
 TEST_F(PointCache, NumberedPlyGivesGradients) {
     Mesh mesh = filigree_test::make_plain_mesh();
-    Pose pose{mesh.positions, {}, {}};
+    Pose pose{mesh.positions, {}};
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
         pose.gradients.push_back((Mat3f() << 1, float(v), 2, 3, 4, 5, 6, 7, 8).finished());
     const auto with_gradients = [&](std::size_t frame) -> Result<Mesh> {

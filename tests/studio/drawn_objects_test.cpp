@@ -228,11 +228,6 @@ TEST_F(DrawnObjectsTest, TheExpectedErrorIsColouredForEveryPose) {
     ASSERT_EQ(drawn->colors().values.size(), count) << "a recorded moment has one as well";
     EXPECT_LT(most(), bent) << "it has only begun to fall";
 
-    workbench.set_mode(Mode::deform);
-    workbench.set_strip({.code = DetailCode::reference});
-    settle();
-    ASSERT_EQ(workbench.state().model->code(), DetailCode::reference);
-    EXPECT_TRUE(drawn->colors().values.empty());
     set([](ViewSettings& s) { s.coloring = &kOwnColors; });
     EXPECT_TRUE(drawn->colors().values.empty());
 }

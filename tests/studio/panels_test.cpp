@@ -146,18 +146,8 @@ TEST_F(Panels, ShapesFollowTheirSliders) {
 TEST_F(Panels, ChoicesAndSwitchesReachTheWorkbench) {
     choose("deform.axis", 2);
     EXPECT_EQ(state().warps.axis, Axis::z);
-    choose("detail.law", 2);
-    EXPECT_EQ(state().restore.law, std::optional(HeightLaw::inverse));
-    choose("detail.law", 0);
-    EXPECT_FALSE(state().restore.law);
-    get<QCheckBox>("detail.thin_shell").click();
-    EXPECT_TRUE(state().restore.thin_shell);
     choose("detail.precision", 1);
     EXPECT_EQ(state().strip.precision, Precision::int16);
-    choose("detail.code", 1);
-    EXPECT_EQ(state().model->code(), DetailCode::reference);
-    choose("detail.references", 1);
-    EXPECT_EQ(state().strip.references, 4u);
     choose("body.preset", 2);
     EXPECT_EQ(state().body.preset, "jelly");
     choose("body.obstacle", 2);

@@ -273,12 +273,6 @@ TEST(Viewport, APoseTooCurvedForTheDriverIsSaidInThePicture) {
     ASSERT_TRUE(stand.is_drawn());
     EXPECT_GT(difference(with, stand.window.grab().toImage(), corner), 2) << "it is not painted";
     EXPECT_EQ(stand.viewport->timings().restore, 0) << "at rest nothing is restored";
-
-    stand.workbench.set_strip({.code = DetailCode::reference});
-    stand.workbench.wait_until_idle();
-    ASSERT_TRUE(stand.is_drawn());
-    EXPECT_FALSE(overlay->content().legend);
-    EXPECT_TRUE(overlay->content().note.contains("blend code")) << overlay->content().note.toStdString();
 }
 
 TEST(Viewport, MeshesWithoutFacesOrExtentAreSeenAndSaidSo) {

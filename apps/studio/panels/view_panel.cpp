@@ -20,9 +20,6 @@ const Field<Settings> kColoring = {
     [](Settings& settings, double row) { settings.coloring = colorings()[std::size_t(row)]; }};
 
 QString expected_error_text(const Workbench& workbench) {
-    const State& state = workbench.state();
-    if (state.model && state.model->code() != DetailCode::blend)
-        return QStringLiteral("What the reference code is off by can only be measured.");
     const PoseError::Estimate* estimate = workbench.expected_error().estimate();
     if (!estimate) return QStringLiteral("Not judged yet.");
     return QStringLiteral("Expected from the pose alone: %1 of the diagonal (root mean square).")

@@ -6,16 +6,14 @@
 
 namespace filigree {
 
-/// Positions of a model's driver (level 0), in its vertex order and relative to the mesh's origin, and optionally how
-/// the space around each vertex is deformed: gradients from the deformer, or one ghost point a vertex.
+/// Positions of a model's driver (level 0), in its vertex order and relative to the mesh's origin, and optionally the
+/// deformer's gradients: how the space around each vertex is deformed.
 struct Pose {
     std::vector<Vec3f> positions;
     std::vector<Mat3f> gradients; ///< empty or one a driver vertex
-    /// Empty or one a driver vertex: where the points off the surface went that Restorer::rest_ghosts gives.
-    std::vector<Vec3f> ghosts;
 };
 
-/// Poses of one driver, moment after moment: positions, and gradients in all of them or in none. No ghosts.
+/// Poses of one driver, moment after moment: positions, and gradients in all of them or in none.
 struct PoseSequence {
     double frames_per_second = 60;
     std::vector<Pose> frames;

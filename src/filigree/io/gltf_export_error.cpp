@@ -36,7 +36,6 @@ Result<Pose> PoseSampler::at(double seconds) {
     };
     blend(pose.positions, (*second)->positions);
     blend(pose.gradients, (*second)->gradients);
-    blend(pose.ghosts, (*second)->ghosts);
     return pose;
 }
 

@@ -96,14 +96,13 @@ Box ModelChunks::box(std::size_t k) const {
 Result<ModelChunks> ModelChunks::open(FileReader file, const std::string& name, const RunContext& context) {
     const Result<ModelOutline> outline = read_model_outline(file, name, context);
     if (!outline) return outline.error();
-    if (outline->code != DetailCode::blend) return no_chunks(name, "has the reference code");
+    if (outline->references > 0) return no_chunks(name, "has the reference code");
     if (outline->coding) return no_chunks(name, "is coded in one piece");
     Result<Mesh> driver = read_model_level(file, 0, name, context);
     if (!driver) return driver.error();
     auto content = std::make_unique<Content>(std::move(file), name);
     try {
         const SectionReader& in = content->sections.emplace(content->file);
-        if (in.version() < 2) return no_chunks(name, "is a file of version 1");
         content->vertices = outline->levels.back().vertices;
         content->all_vertices = content->vertices + (outline->driver_is_behind ? outline->levels.front().vertices : 0);
         if (content->all_vertices >= kNoIndex || in.count("bl.run").first != chunk_count(content->all_vertices))
@@ -164,7 +163,7 @@ Result<KnownPoses> poses_with_gradients(const Restorer& driver, const FrameSourc
         if (!pose) return pose.error();
         Result<std::vector<Mat3f>> gradients = driver.gradients(*pose, silent);
         if (!gradients) return gradients.error();
-        known.poses.push_back({std::move(pose->positions), std::move(*gradients), {}});
+        known.poses.push_back({std::move(pose->positions), std::move(*gradients)});
     }
     return known;
 }

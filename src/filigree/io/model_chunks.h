@@ -10,8 +10,8 @@ namespace filigree {
 /// The driver of a model with the blend code, and its vertices in chunks that are read when they are asked for.
 class ModelChunks {
 public:
-    /// The file is kept open. Errors: as read_model; unsuitable (a file of version 1, or the reference code: those have
-    /// no chunks).
+    /// The file is kept open. Errors: as read_model; unsuitable (a packed file or the reference code: those have no
+    /// chunks).
     static Result<ModelChunks> open(FileReader file, const std::string& name, const RunContext& context);
     ModelChunks(ModelChunks&&) noexcept;
     ModelChunks& operator=(ModelChunks&&) noexcept;

@@ -169,10 +169,6 @@ std::vector<FileLevel> levels_of(const CodedMesh& coded, const Mesh& mesh, const
 
 Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, const MeshCodeOptions& options,
                               const RunContext& context) {
-    const auto* detail = std::get_if<BlendDetail>(&model.detail);
-    if (!detail)
-        return Error{ErrorCode::unsuitable,
-                     "The model has the reference code, which is not packed; strip the mesh with the blend code."};
     const bool elsewhere = model.driver_is_behind;
     if (elsewhere && options.levels)
         return Error{ErrorCode::unsuitable, "The model was stripped to a driver made elsewhere, and streams need one "
@@ -203,7 +199,7 @@ Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, con
                   .bits = options.bits,
                   .surface = options.surface,
                   .keep_order = options.keep_order,
-                  .precision = static_cast<std::uint32_t>(detail->precision),
+                  .precision = static_cast<std::uint32_t>(model.detail.precision),
                   .driver_vertices = driver.vertices.size(),
                   .driver_faces = driver.face_count(),
                   .driver_corners = driver.corners.size()};

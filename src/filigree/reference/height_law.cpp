@@ -1,4 +1,4 @@
-#include "filigree/hierarchy/height_law.h"
+#include "filigree/reference/height_law.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "cases.h"
-#include "filigree/hierarchy/reference_code.h"
 #include "filigree/mesh/shapes.h"
+#include "filigree/reference/reference_code.h"
 #include "hierarchy/stripping.h"
 #include "threads.h"
 
@@ -78,6 +78,20 @@ TEST(ReferenceCode, CoordinatesAreSigned) {
 TEST(ReferenceCode, FourReferencesMeasureFromTheMean) {
     const ReferenceDetail detail = encoded(one_level(4, {0.25f, -0.125f, 0.125f}), 4);
     EXPECT_TRUE(detail.records[4].isApprox(Vec3f(0.25f, -0.125f, 0.125f), 1e-6f)) << detail.records[4].transpose();
+}
+
+TEST(HeightLaw, IsBoundedWhereItHasToBe) {
+    EXPECT_EQ(height_law_scale(HeightLaw::keep, 1, 100), 1);
+    EXPECT_DOUBLE_EQ(height_law_scale(HeightLaw::inverse, 1, 4), 0.5);
+    EXPECT_DOUBLE_EQ(height_law_scale(HeightLaw::proportional, 1, 4), 2);
+    EXPECT_DOUBLE_EQ(height_law_scale(HeightLaw::volume, 1, 2), 0.5);
+    for (const HeightLaw law : {HeightLaw::inverse, HeightLaw::volume}) {
+        EXPECT_DOUBLE_EQ(height_law_scale(law, 1, 0), kMaxHeightScale);
+        EXPECT_DOUBLE_EQ(height_law_scale(law, 1, 1e12), 1 / kMaxHeightScale);
+    }
+    EXPECT_EQ(height_law_scale(HeightLaw::proportional, 1, 0), 0);
+    for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume})
+        EXPECT_EQ(height_law_scale(law, 0, 5), 1); // nothing to compare with
 }
 
 /// Figure 1.1: the width of the references doubles; heights follow the law.

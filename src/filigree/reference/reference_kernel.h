@@ -6,7 +6,7 @@
 #pragma once
 
 #include "filigree/core/lanes.h"
-#include "filigree/hierarchy/height_law.h"
+#include "filigree/reference/height_law.h"
 
 #include <algorithm>
 #include <cstddef>

@@ -1,4 +1,4 @@
-#include "filigree/hierarchy/reference_plan.h"
+#include "filigree/reference/reference_plan.h"
 
 #include <algorithm>
 #include <cmath>

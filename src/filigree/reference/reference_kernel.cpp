@@ -1,4 +1,4 @@
-#include "filigree/hierarchy/reference_kernel.h"
+#include "filigree/reference/reference_kernel.h"
 
 #include <cstring>
 #include <utility>

@@ -5,8 +5,8 @@
 // wait for each other. All positions are scaled by a power of two to about one, which keeps squares in float's range.
 #pragma once
 
-#include "filigree/hierarchy/reference_code.h"
-#include "filigree/hierarchy/reference_kernel.h"
+#include "filigree/reference/reference_code.h"
+#include "filigree/reference/reference_kernel.h"
 
 #include <mutex>
 

@@ -1,8 +1,8 @@
 // Based on: the report, 2.4 and 2.5.
-#include "filigree/hierarchy/reference_code.h"
+#include "filigree/reference/reference_code.h"
 
 #include "filigree/core/parallel_for.h"
-#include "filigree/hierarchy/reference_plan.h"
+#include "filigree/reference/reference_plan.h"
 
 #include <cassert>
 #include <cmath>
@@ -122,13 +122,22 @@ private:
     Work work_;
 };
 
+/// The number of levels whose driver comes closest to the vertices asked for.
+unsigned levels_for(std::size_t vertices, std::size_t base) {
+    const double levels = std::log2(double(std::max<std::size_t>(vertices, 1)) / double(base)) / 2;
+    return static_cast<unsigned>(std::max(1L, std::lround(levels)));
+}
+
 } // namespace
 
 Result<ReferenceDetail> encode_reference(const Mesh& mesh, const ReferenceOptions& options, const RunContext& context) {
     if (options.references != 3 && options.references != 4 && options.references != 6)
         return Error{ErrorCode::usage,
                      "The reference code takes 3, 4 or 6 references, not " + std::to_string(options.references) + "."};
-    auto patches = find_regular_patches(mesh, options.max_levels, context);
+    if (options.max_levels < 1 || options.max_levels > 16) return Error{ErrorCode::usage, "levels must be 1 to 16."};
+    if (options.base && *options.base < 3) return Error{ErrorCode::usage, "base must be 3 or more vertices."};
+    const unsigned most = options.base ? levels_for(mesh.vertex_count(), *options.base) : options.max_levels;
+    auto patches = find_regular_patches(mesh, most, context);
     if (!patches) return patches.error();
     ReferenceDetail detail;
     detail.patches = std::move(*patches);

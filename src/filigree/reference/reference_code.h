@@ -13,17 +13,20 @@
 // references. When removed, the point is `loose` (see ReferenceDetail). So every answer is finite and bounded.
 #pragma once
 
-#include "filigree/hierarchy/height_law.h"
 #include "filigree/mesh/regular_patches.h"
+#include "filigree/reference/height_law.h"
 
 #include <memory>
+#include <optional>
 #include <string>
 
 namespace filigree {
 
 struct ReferenceOptions {
-    unsigned references = 3;  ///< 3 (the report), 4 or 6
-    unsigned max_levels = 16; ///< undo at most this many subdivisions
+    unsigned references = 3;              ///< 3 (the report), 4 or 6
+    unsigned max_levels = 16;             ///< undo at most this many subdivisions, 1 to 16
+    std::optional<std::size_t> base = {}; ///< or as many as bring the driver closest to so many vertices, 3 or more
+    bool operator==(const ReferenceOptions&) const = default;
 };
 
 /// The detail of a regular mesh, coarse to fine: everything restore needs besides the driver's positions.
@@ -45,7 +48,7 @@ struct ReferenceDetail {
 
 /// Removes detail level by level against *decoded* coarser points (closed loop), in the precision of the decode, so
 /// that errors do not add up. Level 0's vertices are the corners of the base quads. Cost O(V).
-/// Errors: as find_regular_patches, which checks the mesh; usage (references not 3, 4 or 6).
+/// Errors: as find_regular_patches, which checks the mesh; usage (an option that is out of its range).
 Result<ReferenceDetail> encode_reference(const Mesh& mesh, const ReferenceOptions& options, const RunContext& context);
 
 /// Restores a regular mesh from driver positions, again and again; from several threads at once if need be.
