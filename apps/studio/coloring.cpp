@@ -75,12 +75,6 @@ ColorWork expected_error_work(const Seen& seen) {
     return at_once({colors.values, ColorMap::sequential, colors.range});
 }
 
-QString why_no_expected_error(const Seen& seen) {
-    return seen.workbench.state().model->code() == DetailCode::blend
-               ? QString()
-               : QStringLiteral("The expected error is known for the blend code alone.");
-}
-
 // Pieces
 
 std::optional<ColorKey> piece_key(const Seen& seen) {
@@ -155,8 +149,7 @@ const Coloring kExpectedErrorColors = {"expected",
                                        expected_error_key,
                                        expected_error_work,
                                        {"Expected error", kPerDiagonal, 100},
-                                       {.expected_error = true},
-                                       why_no_expected_error};
+                                       {.expected_error = true}};
 
 const Coloring kPieceColors = {
     "pieces", "Pi&eces as colours", "Each piece of a mesh that breaks", "Shift+6", "Pieces", piece_key, piece_work};

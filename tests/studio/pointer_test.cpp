@@ -245,6 +245,24 @@ TEST(Pointer, ThePinToolPinsAndUnpins) {
     EXPECT_EQ(pinned(), 0u);
 }
 
+TEST(Pointer, ADragKeepsTheToolItBeganWith) {
+    Stand stand;
+    ASSERT_TRUE(stand.is_ready());
+    const QPoint from = stand.middle(), to = from + QPoint(30, 0);
+    stand.press(from);
+    stand.move(from, to);
+    stand.set([](ViewSettings& s) { s.tool = &kPinTool; });
+    EXPECT_TRUE(stand.workbench.is_pulling());
+    stand.release(to);
+    stand.workbench.wait_until_idle();
+    ASSERT_EQ(stand.workbench.state().handles.size(), 1u);
+    EXPECT_FALSE(stand.workbench.state().handles[0].pinned);
+    ASSERT_TRUE(stand.is_ready());
+    stand.drag(from, to);
+    ASSERT_EQ(stand.workbench.state().handles.size(), 2u);
+    EXPECT_TRUE(stand.workbench.state().handles[1].pinned);
+}
+
 TEST(Pointer, ADragPullsABody) {
     Stand stand("wavy-sphere", 16);
     ASSERT_TRUE(stand.is_ready());
