@@ -15,9 +15,10 @@ namespace filigree::studio {
 namespace {
 
 QString warning_of(const DroppedBody& made) {
-    const QString text = QString::fromStdString(made.report.warning);
-    const bool is_coarse = !driver_warning(measure_driver(*made.model, *made.body), *made.model, *made.body).empty();
-    return is_coarse ? text + QStringLiteral(" Fit driver makes such a driver.") : text;
+    QString text = QString::fromStdString(made.report.warning);
+    if (!made.coarse_driver) return text;
+    if (!text.isEmpty()) text += ' ';
+    return text + QString::fromStdString(made.coarse_driver->sentence()) + ". Fit driver makes such a driver.";
 }
 
 } // namespace

@@ -244,12 +244,24 @@ TEST(SceneKeys, WithoutAKeyTheFreshStructHolds) {
 }
 
 TEST(SceneKeys, AMemberIsOfTheOwnerThatIsGiven) {
-    SceneFile one, other;
+    World one, other;
     const SceneKey& key = *find_key("world", "air_density");
     *std::get<double*>(key.place(&one)) = 3;
-    EXPECT_EQ(one.world.air_density, 3);
-    EXPECT_EQ(other.world.air_density, 0);
-    EXPECT_EQ(*std::get<double*>(key.fresh()), 0);
+    EXPECT_EQ(one.air_density, 3);
+    EXPECT_EQ(other.air_density, 0);
+    EXPECT_EQ(*std::get<double*>(key.fresh_place()), 0);
+    ScenePicture picture;
+    EXPECT_TRUE(key.is_in(&one));
+    EXPECT_FALSE(key.is_in(&picture));
+}
+
+TEST(SceneKeys, TheNumbersOfAMaterialAreAllOfThem) {
+    Material material;
+    double next = 1;
+    for (const SceneKey* key : material_numbers()) number_in(material, *key) = next++;
+    EXPECT_EQ(material.density, 1);
+    EXPECT_EQ(material.young_modulus, 2);
+    EXPECT_EQ(sizeof(Material), sizeof(double) * std::size_t(next)) << "all but the model";
 }
 
 TEST(SceneKeys, EveryKeyIsInTheManual) {

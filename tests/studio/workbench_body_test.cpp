@@ -122,7 +122,7 @@ TEST_F(WorkbenchTest, ADriverTooCoarseForTheBodyIsToldAndFitted) {
     bench.wait_until_idle();
     const std::string warning = bench.body_warning().toStdString();
     EXPECT_NE(warning.find("Fit driver"), std::string::npos) << warning;
-    EXPECT_EQ(warning.find("--"), std::string::npos) << "that is for the command line: " << warning;
+    EXPECT_EQ(warning.find("max_edge"), std::string::npos) << "that is for the command line: " << warning;
     EXPECT_EQ(notes, std::vector{warning});
 
     QSignalSpy withdrawn(&bench, &Workbench::withdrawn);

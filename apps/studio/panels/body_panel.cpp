@@ -5,6 +5,7 @@
 #include "pieces.h"
 
 #include "filigree/physics/material.h"
+#include "filigree/scene/scene_keys.h"
 
 #include <algorithm>
 #include <cmath>
@@ -22,9 +23,22 @@ constexpr double kSomeMeltingFrom = 318, kSomeMeltingTo = 338; // K: as wax
 
 using Body = BodySettings;
 
-Field<Body> material_field(double Material::*member, double offset = 0) {
-    return {[=](const Body& body) { return body.material.*member - offset; },
-            [=](Body& body, double number) { body.material.*member = number + offset; }};
+/// A number of the material, by its key in scenes.
+const SceneKey& material_key(std::string_view name) { return *find_key("body", name); }
+Field<Body> material_field(std::string_view name, double offset = 0) {
+    const SceneKey& key = material_key(name);
+    return {[=, &key](const Body& body) {
+                Material material = body.material;
+                return number_in(material, key) - offset;
+            },
+            [=, &key](Body& body, double number) { number_in(body.material, key) = number + offset; }};
+}
+/// Whether it does something for the body's model.
+bool does_something(std::string_view name, const Body& body) {
+    const std::string_view models = material_key(name).use.models;
+    std::vector<std::string_view> all;
+    each_word(material_key("model").values.words, [&](std::string_view word) { all.push_back(word); });
+    return models.empty() || has_word(models, all[std::size_t(body.material.model)]);
 }
 
 template <class Value>
@@ -69,12 +83,9 @@ const Field<Body> kMeltingTo = {[](const Body& body) { return body.material.melt
                                         std::min(body.material.melting_from, body.material.melting_to);
                                 }};
 
-bool is_of_springs(const Body& body) { return body.material.model == MaterialModel::springs; }
-bool is_not_of_springs(const Body& body) { return !is_of_springs(body); }
 bool is_of_mpm(const Body& body) { return body.material.model == MaterialModel::mpm; }
-bool may_yield(const Body& body) { return !is_of_springs(body) && body.material.model != MaterialModel::rigid; }
+bool may_yield(const Body& body) { return does_something("yield_stress", body); }
 bool is_plastic(const Body& body) { return may_yield(body) && body.material.is_plastic(); }
-bool creeps(const Body& body) { return is_plastic(body) && !is_of_mpm(body); }
 bool melts(const Body& body) { return is_of_mpm(body) && body.material.melts(); }
 
 class BodyPanel : public Panel {
@@ -109,11 +120,11 @@ private:
         number(rows,
                settings.setting("body.young", "Stiffness",
                                 "Young's modulus, pascals: jelly 20 kPa, rubber 1 MPa, steel 200 GPa",
-                                material_field(&Material::young_modulus)),
+                                material_field("young_modulus")),
                {.least = 1e3, .most = 1e10, .decimals = 0, .unit = "Pa", .logarithmic = true, .thousands = true});
         number(rows,
                settings.setting("body.density", "Density", "Kilograms a cubic metre: foam 60, water 1,000, steel 7,800",
-                                material_field(&Material::density)),
+                                material_field("density")),
                {.least = 10, .most = 20000, .decimals = 0, .unit = "kg/m³", .logarithmic = true});
         number(rows,
                settings.setting("body.particles", "Particles",
@@ -214,45 +225,48 @@ private:
         QGridLayout* rows = folded_section(fold);
         const auto settings = body();
         using Condition = OptionsAccess<Body>::Condition;
-        const auto add = [&](const char* name, const char* label, const Field<Body>& of, const NumberSpec& spec,
-                             const QString& tooltip, const Condition& is_shown = {}) {
-            number(rows, settings.setting(name, label, tooltip, of, is_shown), spec);
+        /// Shown where its key does something for the model, and where `is_shown` says so.
+        const auto add = [&](const char* name, const char* label, const char* key, const NumberSpec& spec,
+                             const QString& tooltip, const Condition& is_shown = {}, double offset = 0) {
+            const Condition does = [=](const Body& body) {
+                return does_something(key, body) && (!is_shown || is_shown(body));
+            };
+            number(rows, settings.setting(name, label, tooltip, material_field(key, offset), does), spec);
+        };
+        const auto add_field = [&](const char* name, const char* label, const Field<Body>& of, const NumberSpec& spec,
+                                   const QString& tooltip) {
+            number(rows, settings.setting(name, label, tooltip, of, melts), spec);
         };
         choice(rows,
                settings.setting("body.model", "Method",
                                 "How elasticity is computed. The grid method melts, parts and joins.", kModel),
                {"Finite elements", "Springs", "Meshfree", "Rigid", "Grid (mpm)"});
-        add("body.poisson", "Poisson", material_field(&Material::poisson_ratio),
-            {.least = 0, .most = 0.49, .step = 0.01, .decimals = 2},
-            "Poisson's ratio: how much thinner when stretched; 0.49 keeps the volume", is_not_of_springs);
-        add("body.damping", "Air drag", material_field(&Material::damping),
-            {.least = 0, .most = 10, .step = 0.1, .decimals = 1, .unit = "1/s"},
+        add("body.poisson", "Poisson", "poisson_ratio", {.least = 0, .most = 0.49, .step = 0.01, .decimals = 2},
+            "Poisson's ratio: how much thinner when stretched; 0.49 keeps the volume");
+        add("body.damping", "Air drag", "damping", {.least = 0, .most = 10, .step = 0.1, .decimals = 1, .unit = "1/s"},
             "Share of its speed that motion loses a second");
-        add("body.internal_damping", "Damping", material_field(&Material::internal_damping),
+        add("body.internal_damping", "Damping", "internal_damping",
             {.least = 0, .most = 0.05, .step = 0.0005, .decimals = 4, .unit = "s"},
             "Of the wobbling inside, seconds (Kelvin-Voigt)");
-        add("body.bending", "Bending", material_field(&Material::bending),
-            {.least = 0, .most = 0.2, .step = 0.01, .decimals = 2}, "Springs: share of the stiffness given to bending",
-            is_of_springs);
+        add("body.bending", "Bending", "bending", {.least = 0, .most = 0.2, .step = 0.01, .decimals = 2},
+            "Springs: share of the stiffness given to bending");
         check(rows, settings.setting("body.plastic", "Keeps dents", "Stress beyond the yield stress stays as shape",
                                      kPlastic, may_yield));
-        add("body.yield", "Yield", material_field(&Material::yield_stress),
+        add("body.yield", "Yield", "yield_stress",
             {.least = 100, .most = 1e9, .decimals = 0, .unit = "Pa", .logarithmic = true, .thousands = true},
             "Stress from which shape is lost, pascals", is_plastic);
-        add("body.creep", "Creep", material_field(&Material::creep_time),
-            {.least = 0, .most = 1, .step = 0.01, .decimals = 2, .unit = "s"},
-            "How fast stress beyond yield relaxes, seconds; 0: at once", creeps);
+        add("body.creep", "Creep", "creep_time", {.least = 0, .most = 1, .step = 0.01, .decimals = 2, .unit = "s"},
+            "How fast stress beyond yield relaxes, seconds; 0: at once", is_plastic);
         check(rows, settings.setting("body.melts", "Melts", "Stiff when cold, fluid when warm", kMelts, is_of_mpm));
         const NumberSpec temperature = {.least = -50, .most = 500, .step = 1, .decimals = 0, .unit = "°C"};
-        add("body.melting_from", "Soft from", kMeltingFrom, temperature, "Stiff below, degrees Celsius", melts);
-        add("body.melting_to", "Fluid from", kMeltingTo, temperature, "Fluid above, degrees Celsius", melts);
-        add("body.viscosity", "Viscosity", material_field(&Material::viscosity),
+        add_field("body.melting_from", "Soft from", kMeltingFrom, temperature, "Stiff below, degrees Celsius");
+        add_field("body.melting_to", "Fluid from", kMeltingTo, temperature, "Fluid above, degrees Celsius");
+        add("body.viscosity", "Viscosity", "viscosity",
             {.least = 0.01, .most = 1e5, .decimals = 2, .unit = "Pa s", .logarithmic = true},
             "Of the melt, pascal seconds", melts);
-        add("body.temperature", "Temperature", material_field(&Material::temperature, kCelsius), temperature,
-            "At the start, degrees Celsius", melts);
-        add("body.heating", "Heating", material_field(&Material::heating),
-            {.least = 0, .most = 200, .step = 1, .decimals = 0, .unit = "K/s"},
+        add("body.temperature", "Temperature", "temperature", temperature, "At the start, degrees Celsius", melts,
+            kCelsius);
+        add("body.heating", "Heating", "heating", {.least = 0, .most = 200, .step = 1, .decimals = 0, .unit = "K/s"},
             "How fast the surface warms, kelvins a second", melts);
     }
 

@@ -520,6 +520,7 @@ class Simulation:
         air_temperature: _Keyed = 293.0,
         air_heat_transfer: float = 0.0,
         heat_sources: Sequence[HeatSource] = ...,
+        heat_pace: float = 1.0,
         friction: float = 0.3,
         restitution: float = 0.7,
         frames_per_second: float = 60.0,

@@ -4,43 +4,27 @@
 
 #include <filigree/physics/material.h>
 #include <filigree/scene/particles_near.h>
+#include <filigree/scene/scene_keys.h>
 
 namespace filigree::python {
 
 namespace {
 
-const char* model_name(MaterialModel model) {
-    constexpr const char* names[] = {"fem", "springs", "meshfree", "rigid", "mpm"};
-    return names[static_cast<std::size_t>(model)];
+/// The models by name, in the order of MaterialModel.
+std::vector<std::string> model_names() {
+    std::vector<std::string> names;
+    each_word(find_key("body", "model")->values.words, [&](std::string_view word) { names.emplace_back(word); });
+    return names;
 }
+std::string model_name(MaterialModel model) { return model_names()[static_cast<std::size_t>(model)]; }
 MaterialModel model_of_name(const std::string& name) {
-    return value_of<MaterialModel>(name, "model",
-                                   {{"fem", MaterialModel::fem},
-                                    {"springs", MaterialModel::springs},
-                                    {"meshfree", MaterialModel::meshfree},
-                                    {"rigid", MaterialModel::rigid},
-                                    {"mpm", MaterialModel::mpm}});
+    const std::vector<std::string> names = model_names();
+    const auto found = std::ranges::find(names, name);
+    std::string list;
+    for (const std::string& known : names) list += (list.empty() ? "'" : ", '") + known + "'";
+    if (found == names.end()) refuse("model is '" + name + "', and has to be one of " + list + ".");
+    return static_cast<MaterialModel>(found - names.begin());
 }
-
-/// The numbers of a material, by the names of C++.
-constexpr std::pair<const char*, double Material::*> kQuantities[] = {
-    {"density", &Material::density},
-    {"young_modulus", &Material::young_modulus},
-    {"poisson_ratio", &Material::poisson_ratio},
-    {"damping", &Material::damping},
-    {"internal_damping", &Material::internal_damping},
-    {"bending", &Material::bending},
-    {"yield_stress", &Material::yield_stress},
-    {"creep_time", &Material::creep_time},
-    {"temperature", &Material::temperature},
-    {"melting_from", &Material::melting_from},
-    {"melting_to", &Material::melting_to},
-    {"viscosity", &Material::viscosity},
-    {"heating", &Material::heating},
-    {"conductivity", &Material::conductivity},
-    {"specific_heat", &Material::specific_heat},
-    {"latent_heat", &Material::latent_heat},
-};
 
 Material make_material(const std::string& name, const py::kwargs& changes) {
     std::string known;
@@ -54,10 +38,9 @@ Material make_material(const std::string& name, const py::kwargs& changes) {
                 material.model = model_of_name(value.cast<std::string>());
                 continue;
             }
-            const auto* quantity =
-                std::ranges::find(kQuantities, word, [](const auto& pair) { return std::string_view(pair.first); });
-            if (quantity == std::end(kQuantities)) refuse("A material has no '" + word + "'.");
-            material.*quantity->second = value.cast<double>();
+            const SceneKey* quantity = find_key("body", word);
+            if (!quantity || !quantity->is_in(&material)) refuse("A material has no '" + word + "'.");
+            number_in(material, *quantity) = value.cast<double>();
         }
         if (const std::string wrong = check_material(material); !wrong.empty()) refuse(wrong);
         return material;
@@ -144,16 +127,20 @@ Examples
         .def(
             "__eq__", [](const Material& self, const Material& other) { return self == other; }, py::is_operator())
         .def(py::pickle(
-            [](const Material& self) {
+            [](Material self) {
                 py::dict state;
                 state["model"] = model_name(self.model);
-                for (const auto& [name, quantity] : kQuantities) state[name] = self.*quantity;
+                for (const SceneKey* key : material_numbers())
+                    state[py::str(std::string(key->name))] = number_in(self, *key);
                 return state;
             },
             [](const py::dict& state) { return make_material("rubber", py::kwargs(state)); }));
-    for (const auto& [name, quantity] : kQuantities)
+    for (const SceneKey* key : material_numbers()) {
+        const std::string unit = key->unit.empty() ? "" : std::string(key->unit) + ": ";
         material.def_property_readonly(
-            name, [quantity](const Material& self) { return self.*quantity; }, "As `Material` takes it, SI units.");
+            std::string(key->name).c_str(), [key](Material self) { return number_in(self, *key); },
+            py::doc((unit + std::string(key->text) + ".").c_str()));
+    }
     m.def(
         "materials",
         [] {

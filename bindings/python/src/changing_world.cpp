@@ -17,9 +17,7 @@ namespace {
 std::vector<std::string> doubts_of(const PySimulation& self, const Actor& actor, std::size_t number) {
     std::vector<std::string> sentences;
     const World& world = self.simulation.world();
-    const std::string name = "Body " + std::to_string(number);
-    const std::string weight = weight_warning(*actor.body, actor.placement.linear(), world.gravity, "such soft matter");
-    if (!weight.empty()) sentences.push_back(name + " " + weight);
+    if (const std::string weight = weight_warning(world, actor, number); !weight.empty()) sentences.push_back(weight);
     std::vector<Actor> there;
     for (const std::optional<PyBody>& body : self.bodies)
         if (body) there.emplace_back().body = body->body;

@@ -49,14 +49,23 @@ PyActor actor_of(const py::handle& given, const char* what) {
                       py::make_tuple(0, 0, 0), py::none(), py::none(), true);
 }
 
+std::string weight_warning(const World& world, const Actor& actor, std::size_t number) {
+    const OwnWeight weight = own_weight(*actor.body, actor.placement.linear(), world.gravity);
+    if (!weight.is_too_much()) return "";
+    char what_does[96];
+    std::snprintf(what_does, sizeof what_does, ": scale = %.1g, or young_modulus = %.0e?",
+                  weight.size_that_does(actor.body->scale), weight.modulus_that_does());
+    return "Body " + std::to_string(number) + " " + weight.sentence("such soft matter") + what_does;
+}
+
 namespace {
 
 SimulationPtr make_simulation(const py::object& bodies, const py::object& gravity,
                               const std::vector<Obstacle>& obstacles, const std::vector<Pin>& pins,
                               const std::vector<RegionForce>& forces, const std::vector<Hand>& hands,
                               const py::object& wind, double air_density, const py::object& air_temperature,
-                              double air_heat_transfer, const std::vector<HeatSource>& heat_sources, double friction,
-                              double restitution, double frames_per_second, const std::string& mode,
+                              double air_heat_transfer, const std::vector<HeatSource>& heat_sources, double heat_pace,
+                              double friction, double restitution, double frames_per_second, const std::string& mode,
                               unsigned most_substeps, bool contacts_between_bodies, bool contacts_within_bodies,
                               bool automatic_rigid, unsigned threads) {
     std::vector<std::optional<PyBody>> held;
@@ -73,6 +82,7 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
     world.air_temperature = keyed_number_of(air_temperature, "air_temperature");
     world.air_heat_transfer = air_heat_transfer;
     world.heat_sources = heat_sources;
+    world.heat_pace = heat_pace;
     world.obstacles = obstacles;
     world.pins = pins;
     world.forces = forces;
@@ -81,20 +91,16 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
     world.body_restitution = restitution;
     StepOptions options;
     options.frames_per_second = frames_per_second;
-    options.mode = value_of<StepMode>(
-        mode, "mode",
-        {{"auto", StepMode::automatic}, {"explicit", StepMode::explicit_steps}, {"descent", StepMode::automatic}});
+    options.mode =
+        value_of<StepMode>(mode, "mode", {{"auto", StepMode::automatic}, {"explicit", StepMode::explicit_steps}});
     options.most_substeps = most_substeps;
     options.contacts_between_bodies = contacts_between_bodies;
     options.contacts_within_bodies = contacts_within_bodies;
     options.automatic_rigid = automatic_rigid;
     std::vector<std::string> sentences;
-    if (mode == "descent") sentences.push_back("The mode 'descent' is gone; 'auto' takes its place.");
     for (std::size_t b = 0; b < actors.size(); ++b)
-        if (const std::string weight =
-                weight_warning(*actors[b].body, actors[b].placement.linear(), world.gravity, "such soft matter");
-            !weight.empty())
-            sentences.push_back("Body " + std::to_string(b) + " " + weight);
+        if (const std::string weight = weight_warning(world, actors[b], b); !weight.empty())
+            sentences.push_back(weight);
     if (const std::string sentence = why_models_do_not_meet(actors); !sentence.empty())
         sentences.push_back(sentence + ".");
     for (const SlenderObstacle& slender : find_slender_obstacles(world, actors))
@@ -247,6 +253,8 @@ air_density : float
 air_temperature, air_heat_transfer : float
     K (a number, or a pair of times and values) and W/(m^2 K): heat between the air and bodies of 'mpm'.
 heat_sources : sequence of HeatSource
+heat_pace : float
+    How many times quicker than in truth heat goes, in and around bodies of 'mpm'.
 friction, restitution : float
     Where bodies touch each other.
 frames_per_second : float
@@ -279,17 +287,23 @@ Examples
 >>> filigree.restore(model, driver.pose())
 <filigree.Mesh: 1538 vertices, 1536 faces>
 )");
+    const World world;
+    const StepOptions steps;
     simulation
         .def(
             py::init(&make_simulation), py::arg("bodies"), py::kw_only(),
             py::arg("gravity") = py::make_tuple(0, -9.81, 0), py::arg("obstacles") = py::tuple(),
             py::arg("pins") = py::tuple(), py::arg("forces") = py::tuple(), py::arg("hands") = py::tuple(),
-            py::arg("wind") = py::make_tuple(0, 0, 0), py::arg("air_density") = 0.0, py::arg("air_temperature") = 293.0,
-            py::arg("air_heat_transfer") = 0.0, py::arg("heat_sources") = py::tuple(), py::arg("friction") = 0.3,
-            py::arg("restitution") = 0.7, py::arg("frames_per_second") = 60.0, py::arg("mode") = "auto",
-            py::arg("most_substeps") = 500, py::arg("contacts_between_bodies") = true,
-            py::arg("contacts_within_bodies") = true, py::arg("automatic_rigid") = true, py::arg("threads") = 0,
-            R"(__init__(self, bodies, *, gravity=(0, -9.81, 0), obstacles=(), pins=(), forces=(), hands=(), wind=(0, 0, 0), air_density=0.0, air_temperature=293.0, air_heat_transfer=0.0, heat_sources=(), friction=0.3, restitution=0.7, frames_per_second=60.0, mode='auto', most_substeps=500, contacts_between_bodies=True, contacts_within_bodies=True, automatic_rigid=True, threads=0)
+            py::arg("wind") = py::make_tuple(0, 0, 0), py::arg("air_density") = world.air_density,
+            py::arg("air_temperature") = world.air_temperature.constant,
+            py::arg("air_heat_transfer") = world.air_heat_transfer, py::arg("heat_sources") = py::tuple(),
+            py::arg("heat_pace") = world.heat_pace, py::arg("friction") = world.body_friction,
+            py::arg("restitution") = world.body_restitution, py::arg("frames_per_second") = steps.frames_per_second,
+            py::arg("mode") = "auto", py::arg("most_substeps") = steps.most_substeps,
+            py::arg("contacts_between_bodies") = steps.contacts_between_bodies,
+            py::arg("contacts_within_bodies") = steps.contacts_within_bodies,
+            py::arg("automatic_rigid") = steps.automatic_rigid, py::arg("threads") = 0,
+            R"(__init__(self, bodies, *, gravity=(0, -9.81, 0), obstacles=(), pins=(), forces=(), hands=(), wind=(0, 0, 0), air_density=0.0, air_temperature=293.0, air_heat_transfer=0.0, heat_sources=(), heat_pace=1.0, friction=0.3, restitution=0.7, frames_per_second=60.0, mode='auto', most_substeps=500, contacts_between_bodies=True, contacts_within_bodies=True, automatic_rigid=True, threads=0)
 --
 
 )")

@@ -34,6 +34,9 @@ using SimulationPtr = std::shared_ptr<PySimulation>;
 /// A Body or an Actor; `what` begins the sentence where it is neither.
 PyActor actor_of(const py::handle& given, const char* what);
 
+/// That a body's own weight would flatten it, with what would do; "": it would not.
+std::string weight_warning(const World& world, const Actor& actor, std::size_t number);
+
 /// A world that changes.
 void add_changes(py::class_<PySimulation, SimulationPtr>& simulation);
 

@@ -97,3 +97,37 @@ def test_pages(page, tmp_path, monkeypatch):
     names = {}
     for block in blocks:
         exec(block.split("```")[0], names)
+
+
+def keys_of_scenes():
+    """Every key of docs/scenes.md, which is the table that the reader of scenes goes by: (table, key, what holds without)."""
+    table = None
+    for line in (Path(__file__).resolve().parents[3] / "docs/scenes.md").read_text().splitlines():
+        if line.startswith("#"):
+            table = line.strip("#` []")
+        elif table and line.startswith("| `") and line.count(" | ") >= 5:
+            cells = [cell.strip("` ") for cell in line.strip("|").split(" | ")]
+            yield table, cells[0], cells[3]
+
+
+def test_a_simulation_takes_what_scenes_say_of_the_world():
+    of_scenes_alone = {"frames", "duration"}
+    said = inspect.signature(filigree.Simulation).parameters
+    found = 0
+    for table, key, unset in keys_of_scenes():
+        if table not in ("world", "simulation") or key in of_scenes_alone:
+            continue
+        found += 1
+        parameter = said[key.removeprefix("body_")]
+        if key != "air_density":  # of which scenes with wind have another
+            wanted = {"true": True, "false": False, "auto": "auto"}.get(unset)
+            assert parameter.default == (eval(unset.replace("[", "(").replace("]", ")")) if wanted is None else wanted), key
+    assert found == 14
+
+
+def test_a_material_has_what_scenes_say_of_it():
+    material = filigree.Material("rubber")
+    quantities = [key for table, key, unset in keys_of_scenes() if table == "body" and unset == "by the material"]
+    assert len(quantities) == 17
+    for key in quantities:
+        assert isinstance(getattr(material, key), str if key == "model" else float)

@@ -346,9 +346,7 @@ def test_a_start_inside_an_obstacle_is_told(body):
         filigree.Simulation([body], obstacles=[filigree.Obstacle.plane((0, 0, 0))])
 
 
-def test_a_mode_that_is_gone_is_told(body):
-    with pytest.warns(filigree.FiligreeWarning, match="'descent' is gone; 'auto' takes its place"):
-        filigree.Simulation([body], mode="descent")
+def test_a_mode_that_is_not_there_is_refused(body):
     with pytest.raises(filigree.UsageError, match="mode"):
         filigree.Simulation([body], mode="implicit")
 

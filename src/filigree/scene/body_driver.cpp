@@ -83,13 +83,15 @@ DriverEdges measure_driver(const Model& model, const Body& body) {
     return edges;
 }
 
-std::string driver_warning(const DriverEdges& edges, const Model& model, const Body& body) {
-    if (edges.on_long_edges <= kFewOnLongEdges) return "";
+std::optional<CoarseDriver> coarse_driver(const DriverEdges& edges, const Model& model, const Body& body) {
+    if (edges.on_long_edges <= kFewOnLongEdges) return std::nullopt;
+    return CoarseDriver{edges.on_long_edges, edges.longest, default_base(body), default_max_edge(model.mesh, body)};
+}
+
+std::string CoarseDriver::sentence() const {
     return fmt::format("{:.0f} % of the mesh hangs on driver triangles longer than {} spacings ({:.1f} at most), which "
-                       "cannot follow the particles; a driver of about {} vertices does (stripped with base {} and "
-                       "max_edge {:.2g}).",
-                       100 * edges.on_long_edges, kLongestDriverEdge, edges.longest, with_commas(default_base(body)),
-                       default_base(body), default_max_edge(model.mesh, body));
+                       "cannot follow the particles; a driver of about {} vertices does",
+                       100 * on_long_edges, kLongestDriverEdge, longest, with_commas(base));
 }
 
 ExpectedError expected_error(const PoseSequence& poses, const DriverEdges& edges, const Model& model,

@@ -28,8 +28,15 @@ StripOptions body_driver_options(const Mesh& mesh, const Body& body);
 /// Cost O(vertices).
 DriverEdges measure_driver(const Model& model, const Body& body);
 
-/// A sentence where the driver is too coarse to follow the body's particles, or "".
-std::string driver_warning(const DriverEdges& edges, const Model& model, const Body& body);
+/// A driver that is too coarse to follow the body's particles, and how to strip one that does.
+struct CoarseDriver {
+    double on_long_edges = 0, longest = 0; ///< as in DriverEdges
+    std::size_t base = 0;                  ///< StripOptions of a driver that does
+    double max_edge = 0;
+    std::string sentence() const; ///< without a full stop
+};
+/// None: it is fine enough.
+std::optional<CoarseDriver> coarse_driver(const DriverEdges& edges, const Model& model, const Body& body);
 
 /// Root mean square distances to expect, in diagonals at rest, means over the moving frames.
 struct ExpectedError {

@@ -2,12 +2,13 @@
 
 #include "filigree/mesh.h"
 #include "filigree/physics/body/own_weight.h"
-#include "filigree/scene/body_driver.h"
 #include "filigree/scene/particles_near.h"
 
 #include <algorithm>
 #include <limits>
 #include <numbers>
+
+#include <fmt/format.h>
 
 namespace filigree {
 
@@ -116,6 +117,10 @@ private:
     DroppedBody* dropped_ = nullptr;
 };
 
+void warn(BodyReport& report, const std::string& sentence) {
+    report.warning += (report.warning.empty() ? "" : " ") + sentence;
+}
+
 /// Particles near the pinned vertices are held fast, where they are.
 void hold_pinned(std::span<const Index> pinned, DroppedBody& dropped) {
     const std::vector<Vec3f> driver = driver_positions(*dropped.model);
@@ -147,8 +152,7 @@ Status let_it_melt(const DropOptions& options, const BodyLook& look, DroppedBody
     if (melting) {
         dropped.melting = std::make_shared<const MeltingModel>(std::move(*melting));
     } else if (melting.error().code == ErrorCode::unsuitable) {
-        dropped.report.warning += std::string(dropped.report.warning.empty() ? "" : " ") +
-                                  "The mesh is not closed, so it neither parts nor joins where it melts.";
+        warn(dropped.report, "The mesh is not closed, so it neither parts nor joins where it melts.");
     } else {
         return melting.error();
     }
@@ -199,19 +203,13 @@ Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<con
     Result<Body> body = make_body(whole, options.material, body_options, context, &dropped->report);
     if (!body) return body.error();
     dropped->body = std::make_shared<const Body>(std::move(*body));
-    const auto warn = [&](const std::string& sentence) {
-        std::string& said = dropped->report.warning;
-        if (!sentence.empty()) said += (said.empty() ? "" : " ") + sentence;
-    };
     const Vec3d gravity = options.gravity ? Vec3d(-kEarthGravity * up) : Vec3d(Vec3d::Zero());
-    if (const std::string weight =
-            weight_warning(*dropped->body, Mat3d::Identity(), gravity, "such soft matter", options.size);
-        !weight.empty())
-        warn("The body " + weight);
-    if (const std::string coarse =
-            driver_warning(measure_driver(*dropped->model, *dropped->body), *dropped->model, *dropped->body);
-        !coarse.empty())
-        warn(coarse);
+    if (const OwnWeight weight = own_weight(*dropped->body, Mat3d::Identity(), gravity); weight.is_too_much())
+        warn(dropped->report, fmt::format("The body {}; {:.1g} m long, or with a Young's modulus of {:.0e} Pa, it can.",
+                                          weight.sentence("such soft matter"), weight.size_that_does(options.size),
+                                          weight.modulus_that_does()));
+    dropped->coarse_driver =
+        coarse_driver(measure_driver(*dropped->model, *dropped->body), *dropped->model, *dropped->body);
     if (breaking) {
         FractureMaterial material;
         const double stiffness = options.material.young_modulus;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/physics/world.h"
+#include "filigree/scene/body_driver.h"
 #include "filigree/scene/breaking.h"
 #include "filigree/scene/melting_model.h"
 
@@ -51,10 +52,11 @@ struct DroppedBody {
     std::shared_ptr<const BreakingModel> breaking; ///< null: it does not break
     std::shared_ptr<const Fracture> fracture;      ///< null: it does not break
     std::shared_ptr<const MeltingModel> melting;   ///< null: it does not melt, or its mesh is open
-    BodyReport report;
-    double scale = 1;   ///< metres a model unit
-    double longest = 0; ///< side of the mesh's box, model units
-    World world;        ///< metres, relative to the model's origin times the scale
+    BodyReport report;                             ///< its warning also says what is wrong with the drop
+    std::optional<CoarseDriver> coarse_driver;     ///< where the model's driver is one
+    double scale = 1;                              ///< metres a model unit
+    double longest = 0;                            ///< side of the mesh's box, model units
+    World world;                                   ///< metres, relative to the model's origin times the scale
     Surroundings surroundings;
 };
 

@@ -167,6 +167,7 @@ private:
     void read_simulation(const SceneTable& in) {
         in.refuse_both("frames", "duration");
         in.read(&scene_);
+        in.read(&scene_.step);
         if (!scene_.duration) return;
         const double frames = std::round(*scene_.duration * scene_.step.frames_per_second);
         const double most = find_key("simulation", "frames")->values.most;
@@ -180,7 +181,7 @@ private:
     void read_world(const SceneTable& in) {
         constexpr double kAir = 1.2; // kg/m^3, at 20 degrees Celsius
         if (in.has("wind")) scene_.world.air_density = kAir;
-        in.read(&scene_);
+        in.read(&scene_.world);
     }
 
     void read_body(const SceneTable& in) {
@@ -190,8 +191,10 @@ private:
         in.refuse_other_shapes(in.has("shape") ? "shape" : "mesh");
         if (in.has("mesh")) in.refuse_both("size", "scale");
         in.refuse_both("particles", "spacing");
-        body.material = begun_material(in, body);
         in.read(&body);
+        in.read(&body.shape_options);
+        body.material = begun_material(in, body.material_name);
+        in.read(&body.material);
         check_material_of(in, body.material);
         if (in.has("shape"))
             body.shape_options.size = body.size.value_or(body.shape_options.size);
@@ -224,21 +227,20 @@ private:
         return *std::ranges::find(named_materials(), name, &NamedMaterial::name);
     }
 
-    /// The named material, and the model that the file gives it.
-    static Material begun_material(const SceneTable& in, SceneBody& body) {
-        in.read("material", &body);
+    /// A named material, with the model that the file gives it.
+    static Material begun_material(const SceneTable& in, const std::string& name) {
         std::vector<std::string_view> names;
         for (const NamedMaterial& named : named_materials()) names.push_back(named.name);
-        if (std::ranges::find(names, body.material_name) == names.end()) {
-            const std::string alike = most_alike(body.material_name, names);
-            in.fail("material", fmt::format("there is no material '{}'{}; there are {}", body.material_name,
+        if (std::ranges::find(names, name) == names.end()) {
+            const std::string alike = most_alike(name, names);
+            in.fail("material", fmt::format("there is no material '{}'{}; there are {}", name,
                                             alike.empty() ? "" : " ('" + alike + "'?)", fmt::join(names, ", ")));
         }
-        body.material = material_called(body.material_name).material;
-        in.read("model", &body);
-        in.refuse_other_models(body.material.model);
-        Material material = body.material; // as another model, a material that yields or melts does not
+        Material material = material_called(name).material;
+        in.read("model", &material);
         const MaterialModel model = material.model;
+        in.refuse_other_models(model);
+        // As another model, a material that yields or melts does not.
         if (model != MaterialModel::mpm) material.melting_from = material.melting_to = Material::kNever;
         if (model == MaterialModel::springs || model == MaterialModel::rigid) material.yield_stress = Material::kNever;
         return material;
@@ -392,7 +394,7 @@ private:
     }
 
     void read_picture(const SceneTable& in) {
-        in.read(&scene_);
+        in.read(&scene_.picture);
         const ScenePicture& picture = scene_.picture;
         if (picture.eye.has_value() != picture.target.has_value()) in.fail("eye and target of the camera go together");
         if (picture.eye && *picture.eye == *picture.target) in.fail("eye", "eye and target are the same point");

@@ -18,20 +18,21 @@ constexpr KeyUse models(std::string_view words) { return {.models = words}; }
 template <class Owner, class T>
 Owner owner_of(T Owner::*);
 
-/// Down from the owner of the table by one member after the other.
+/// Down from the owner by one member after the other.
 template <auto First, auto... Rest>
 KeyPlace place_in(SceneOwner owner) {
     return &((std::get<decltype(owner_of(First))*>(owner)->*First).*....*Rest);
 }
-template <auto First, auto... Rest>
-KeyPlace place_in_fresh() {
+/// A struct that no file has filled.
+template <auto First, auto...>
+SceneOwner fresh_owner() {
     static decltype(owner_of(First)) fresh;
-    return place_in<First, Rest...>(&fresh);
+    return &fresh;
 }
 template <auto... Members>
 constexpr SceneKey key(std::string_view table, std::string_view name, std::string_view unit, KeyValues values,
                        std::string_view text, std::string_view unset = "", KeyUse use = {}) {
-    return {table, name, &place_in<Members...>, &place_in_fresh<Members...>, unit, values, text, unset, use};
+    return {table, name, &place_in<Members...>, &fresh_owner<Members...>, unit, values, text, unset, use};
 }
 
 constexpr std::string_view kByMaterial = "by the material";
@@ -40,36 +41,31 @@ const SceneKey kKeys[] = {
     key<&SceneFile::frames>("simulation", "frames", "", from(1, 1e6),
                             "frames to compute; the start is one more in the output"),
     key<&SceneFile::duration>("simulation", "duration", "s", above(0, 1e6), "or how long to compute"),
-    key<&SceneFile::step, &StepOptions::frames_per_second>("simulation", "frames_per_second", "1/s", from(10, 1e4),
-                                                           "of the output"),
-    key<&SceneFile::step, &StepOptions::mode>(
+    key<&StepOptions::frames_per_second>("simulation", "frames_per_second", "1/s", from(10, 1e4), "of the output"),
+    key<&StepOptions::mode>(
         "simulation", "mode", "", one_of("auto explicit"),
         "auto: bodies that are too stiff for most_substeps become rigid; explicit: they stay elastic"),
-    key<&SceneFile::step, &StepOptions::most_substeps>(
-        "simulation", "most_substeps", "", from(1, 1e5),
-        "substeps a frame; with mode auto, a body that needs more becomes rigid"),
-    key<&SceneFile::step, &StepOptions::contacts_between_bodies>("simulation", "contacts_between_bodies", "", kAnything,
-                                                                 "whether bodies touch each other"),
-    key<&SceneFile::step, &StepOptions::contacts_within_bodies>("simulation", "contacts_within_bodies", "", kAnything,
-                                                                "whether a body touches itself"),
-    key<&SceneFile::step, &StepOptions::automatic_rigid>(
+    key<&StepOptions::most_substeps>("simulation", "most_substeps", "", from(1, 1e5),
+                                     "substeps a frame; with mode auto, a body that needs more becomes rigid"),
+    key<&StepOptions::contacts_between_bodies>("simulation", "contacts_between_bodies", "", kAnything,
+                                               "whether bodies touch each other"),
+    key<&StepOptions::contacts_within_bodies>("simulation", "contacts_within_bodies", "", kAnything,
+                                              "whether a body touches itself"),
+    key<&StepOptions::automatic_rigid>(
         "simulation", "automatic_rigid", "", kAnything,
         "whether bodies of fewer than 8 cells, or that need more than most_substeps, become rigid"),
 
-    key<&SceneFile::world, &World::gravity>("world", "gravity", "m/s^2", kAnything, "acceleration of everything"),
-    key<&SceneFile::world, &World::wind>("world", "wind", "m/s", kAnything, "velocity of the air"),
-    key<&SceneFile::world, &World::air_density>("world", "air_density", "kg/m^3", from(0, 1e4),
-                                                "how hard the air presses", "1.2 with wind, else 0"),
-    key<&SceneFile::world, &World::body_friction>("world", "body_friction", "", from(0, 100),
-                                                  "Coulomb's coefficient between bodies"),
-    key<&SceneFile::world, &World::body_restitution>("world", "body_restitution", "", from(0, 1),
-                                                     "between bodies, as that of obstacles"),
-    key<&SceneFile::world, &World::air_temperature>("world", "air_temperature", "K", above(0, 1e5),
-                                                    "around bodies of mpm"),
-    key<&SceneFile::world, &World::air_heat_transfer>("world", "air_heat_transfer", "W/(m^2 K)", from(0, 1e9),
-                                                      "how well the air warms and cools them; still air 10"),
-    key<&SceneFile::world, &World::heat_pace>("world", "heat_pace", "", above(0, 1e9),
-                                              "how many times quicker than in truth heat goes, in and around them"),
+    key<&World::gravity>("world", "gravity", "m/s^2", kAnything, "acceleration of everything"),
+    key<&World::wind>("world", "wind", "m/s", kAnything, "velocity of the air"),
+    key<&World::air_density>("world", "air_density", "kg/m^3", from(0, 1e4), "how hard the air presses",
+                             "1.2 with wind, else 0"),
+    key<&World::body_friction>("world", "body_friction", "", from(0, 100), "Coulomb's coefficient between bodies"),
+    key<&World::body_restitution>("world", "body_restitution", "", from(0, 1), "between bodies, as that of obstacles"),
+    key<&World::air_temperature>("world", "air_temperature", "K", above(0, 1e5), "around bodies of mpm"),
+    key<&World::air_heat_transfer>("world", "air_heat_transfer", "W/(m^2 K)", from(0, 1e9),
+                                   "how well the air warms and cools them; still air 10"),
+    key<&World::heat_pace>("world", "heat_pace", "", above(0, 1e9),
+                           "how many times quicker than in truth heat goes, in and around them"),
 
     key<&SceneBody::name>("body", "name", "", kAnything,
                           "of files, and for pins, forces and hands; letters, digits, - and _",
@@ -78,21 +74,18 @@ const SceneKey kKeys[] = {
                           "file of a mesh or model (.fil), seen from the scene's folder; or"),
     key<&SceneBody::shape>("body", "shape", "",
                            one_of("wavy-cube wavy-sphere wavy-plane wavy-plate bar cylinder torus"),
-                           "a built-in shape, as `filigree make` has them; one of `mesh` and `shape` must be there"),
-    key<&SceneBody::shape_options, &ShapeOptions::resolution>("body", "resolution", "", from(1, 8192),
-                                                              "quads along a side", "", shapes("shape")),
-    key<&SceneBody::shape_options, &ShapeOptions::frequency>("body", "frequency", "", from(0, 1e6),
-                                                             "waves along a side", "", shapes("shape")),
-    key<&SceneBody::shape_options, &ShapeOptions::amplitude>("body", "amplitude", "sides", from(0, 10),
-                                                             "height of the waves", "", shapes("shape")),
+                           "a built-in shape; one of `mesh` and `shape` must be there"),
+    key<&ShapeOptions::resolution>("body", "resolution", "", from(1, 8192), "quads along a side", "", shapes("shape")),
+    key<&ShapeOptions::frequency>("body", "frequency", "", from(0, 1e6), "waves along a side", "", shapes("shape")),
+    key<&ShapeOptions::amplitude>("body", "amplitude", "sides", from(0, 10), "height of the waves", "",
+                                  shapes("shape")),
     key<&SceneBody::size>(
         "body", "size", "m", from(1e-30, 1e30),
         "longest side of a mesh, in place of `scale`; of a shape its side or diameter, in model units", "1 of a shape"),
-    key<&SceneBody::shape_options, &ShapeOptions::length>("body", "length", "sides", from(1e-3, 1e6),
-                                                          "of bars and cylinders", "", shapes("shape")),
-    key<&SceneBody::shape_options, &ShapeOptions::thickness>("body", "thickness", "ring radii; sides", from(1e-6, 1),
-                                                             "of a torus: radius of its tube; of a plate", "",
-                                                             shapes("shape")),
+    key<&ShapeOptions::length>("body", "length", "sides", from(1e-3, 1e6), "of bars and cylinders", "",
+                               shapes("shape")),
+    key<&ShapeOptions::thickness>("body", "thickness", "ring radii; sides", from(1e-6, 1),
+                                  "of a torus: radius of its tube; of a plate", "", shapes("shape")),
     key<&SceneBody::driver>("body", "driver", "vertices", from(3, 1e8),
                             "of the driver that the particles move, whose edges are else 0.8 spacings on average; a "
                             "model has its own",
@@ -105,46 +98,39 @@ const SceneKey kKeys[] = {
         "body", "spacing", "m", above(0, 1e6), "in place of `particles`: from one to the next", "by `particles`"),
     key<&SceneBody::material_name>("body", "material", "", kAnything,
                                    "one of the materials below; the keys from `model` on change it"),
-    key<&SceneBody::material, &Material::model>(
-        "body", "model", "", one_of("fem springs meshfree rigid mpm"),
-        "finite elements, springs, or mesh-free; rigid does not deform; mpm melts, parts and joins", kByMaterial),
-    key<&SceneBody::material, &Material::density>("body", "density", "kg/m^3", from(1e-9, 1e6), "mass by volume",
-                                                  kByMaterial),
-    key<&SceneBody::material, &Material::young_modulus>("body", "young_modulus", "Pa", from(1e-9, 1e12), "stiffness",
-                                                        kByMaterial, models("fem springs meshfree mpm")),
-    key<&SceneBody::material, &Material::poisson_ratio>("body", "poisson_ratio", "", from(0, 0.49),
-                                                        "how much it thins when pulled; springs have 1/4", kByMaterial,
-                                                        models("fem meshfree mpm")),
-    key<&SceneBody::material, &Material::damping>(
-        "body", "damping", "1/s", from(0, 1e6), "decay rate d: e^-d of the speed is left after a second", kByMaterial),
-    key<&SceneBody::material, &Material::internal_damping>("body", "internal_damping", "s", from(0, 1e3),
-                                                           "stress by the rate of strain, as a multiple of stiffness",
-                                                           kByMaterial, models("fem springs meshfree")),
-    key<&SceneBody::material, &Material::bending>("body", "bending", "", from(0, 0.2), "share of bending springs",
-                                                  kByMaterial, models("springs")),
-    key<&SceneBody::material, &Material::yield_stress>("body", "yield_stress", "Pa", above(0, 1e12),
-                                                       "above it the shape changes for good", kByMaterial,
-                                                       models("fem meshfree mpm")),
-    key<&SceneBody::material, &Material::creep_time>("body", "creep_time", "s", from(0, 1e6),
-                                                     "how slowly the shape changes above yield_stress; 0 is at once",
-                                                     kByMaterial, models("fem meshfree")),
-    key<&SceneBody::material, &Material::temperature>("body", "temperature", "K", above(0, 1e5), "at the start",
-                                                      kByMaterial, models("mpm")),
-    key<&SceneBody::material, &Material::melting_from>("body", "melting_from", "K", from(0, 1e5), "stiff below",
-                                                       kByMaterial, models("mpm")),
-    key<&SceneBody::material, &Material::melting_to>("body", "melting_to", "K", from(0, 1e5), "fluid above",
-                                                     kByMaterial, models("mpm")),
-    key<&SceneBody::material, &Material::viscosity>("body", "viscosity", "Pa s", from(0, 1e9), "of the melt",
-                                                    kByMaterial, models("mpm")),
-    key<&SceneBody::material, &Material::heating>("body", "heating", "K/s", from(-1e6, 1e6),
-                                                  "of the surface, from around", kByMaterial, models("mpm")),
-    key<&SceneBody::material, &Material::conductivity>("body", "conductivity", "m^2/s", from(0, 1e3),
-                                                       "thermal diffusivity inside", kByMaterial, models("mpm")),
-    key<&SceneBody::material, &Material::specific_heat>("body", "specific_heat", "J/(kg K)", above(0, 1e6),
-                                                        "solid and fluid", kByMaterial, models("mpm")),
-    key<&SceneBody::material, &Material::latent_heat>("body", "latent_heat", "J/kg", from(0, 1e9),
-                                                      "that melting takes, and freezing gives back", kByMaterial,
-                                                      models("mpm")),
+    key<&Material::model>("body", "model", "", one_of("fem springs meshfree rigid mpm"),
+                          "finite elements, springs, or mesh-free; rigid does not deform; mpm melts, parts and joins",
+                          kByMaterial),
+    key<&Material::density>("body", "density", "kg/m^3", from(1e-9, 1e6), "mass by volume", kByMaterial),
+    key<&Material::young_modulus>("body", "young_modulus", "Pa", from(1e-9, 1e12), "stiffness", kByMaterial,
+                                  models("fem springs meshfree mpm")),
+    key<&Material::poisson_ratio>("body", "poisson_ratio", "", from(0, 0.49),
+                                  "how much it thins when pulled; springs have 1/4", kByMaterial,
+                                  models("fem meshfree mpm")),
+    key<&Material::damping>("body", "damping", "1/s", from(0, 1e6),
+                            "decay rate d: e^-d of the speed is left after a second", kByMaterial),
+    key<&Material::internal_damping>("body", "internal_damping", "s", from(0, 1e3),
+                                     "stress by the rate of strain, as a multiple of stiffness", kByMaterial,
+                                     models("fem springs meshfree")),
+    key<&Material::bending>("body", "bending", "", from(0, 0.2), "share of bending springs", kByMaterial,
+                            models("springs")),
+    key<&Material::yield_stress>("body", "yield_stress", "Pa", above(0, 1e12), "above it the shape changes for good",
+                                 kByMaterial, models("fem meshfree mpm")),
+    key<&Material::creep_time>("body", "creep_time", "s", from(0, 1e6),
+                               "how slowly the shape changes above yield_stress; 0 is at once", kByMaterial,
+                               models("fem meshfree")),
+    key<&Material::temperature>("body", "temperature", "K", above(0, 1e5), "at the start", kByMaterial, models("mpm")),
+    key<&Material::melting_from>("body", "melting_from", "K", from(0, 1e5), "stiff below", kByMaterial, models("mpm")),
+    key<&Material::melting_to>("body", "melting_to", "K", from(0, 1e5), "fluid above", kByMaterial, models("mpm")),
+    key<&Material::viscosity>("body", "viscosity", "Pa s", from(0, 1e9), "of the melt", kByMaterial, models("mpm")),
+    key<&Material::heating>("body", "heating", "K/s", from(-1e6, 1e6), "of the surface, from around", kByMaterial,
+                            models("mpm")),
+    key<&Material::conductivity>("body", "conductivity", "m^2/s", from(0, 1e3), "thermal diffusivity inside",
+                                 kByMaterial, models("mpm")),
+    key<&Material::specific_heat>("body", "specific_heat", "J/(kg K)", above(0, 1e6), "solid and fluid", kByMaterial,
+                                  models("mpm")),
+    key<&Material::latent_heat>("body", "latent_heat", "J/kg", from(0, 1e9),
+                                "that melting takes, and freezing gives back", kByMaterial, models("mpm")),
     key<&SceneBody::centre>("body", "centre", "m", kAnything, "of the body's box at the start",
                             "where its coordinates say"),
     key<&SceneBody::rotation>("body", "rotate", "degrees", kAnything,
@@ -290,26 +276,24 @@ const SceneKey kKeys[] = {
     key<&SceneHand::hand, &Hand::from>("hand", "from", "s", from(0, 1e9), "when it takes hold"),
     key<&SceneHand::hand, &Hand::until>("hand", "until", "s", from(0, 1e9), "when it lets go", "to the end"),
 
-    key<&SceneFile::picture, &ScenePicture::view>("picture", "view", "", one_of("front side top iso"), "where from"),
-    key<&SceneFile::picture, &ScenePicture::up>("picture", "up", "", one_of("x y z"), "which axis is up"),
-    key<&SceneFile::picture, &ScenePicture::eye>("picture", "eye", "m", kAnything, "where the camera is; with `target`",
-                                                 "as near as all the motion fits"),
-    key<&SceneFile::picture, &ScenePicture::target>("picture", "target", "m", kAnything, "what it looks at"),
-    key<&SceneFile::picture, &ScenePicture::field_of_view>("picture", "field_of_view", "degrees", from(0, 150),
-                                                           "vertical; 0 is parallel projection"),
-    key<&SceneFile::picture, &ScenePicture::size>("picture", "size", "pixels", from(16, 8192), "width and height"),
-    key<&SceneFile::picture, &ScenePicture::background>(
-        "picture", "background", "", kAnything, "`\"#rrggbb\"`, or two from top to bottom: `\"#rrggbb,#rrggbb\"`",
-        "light grey"),
-    key<&SceneFile::picture, &ScenePicture::ground>("picture", "ground", "", kAnything,
-                                                    "whether a level ground, or the lowest point, catches the shadow"),
-    key<&SceneFile::picture, &ScenePicture::obstacles>("picture", "obstacles", "", kAnything, "whether they are drawn"),
-    key<&SceneFile::picture, &ScenePicture::particles>("picture", "particles", "", kAnything,
-                                                       "whether particles are drawn in place of the surface"),
-    key<&SceneFile::picture, &ScenePicture::passes>("picture", "passes", "", from(1, 1000),
-                                                    "light directions that are averaged"),
-    key<&SceneFile::picture, &ScenePicture::most_triangles>("picture", "most_triangles", "", from(1, 1e9),
-                                                            "of a body; a larger one is drawn at a coarser level"),
+    key<&ScenePicture::view>("picture", "view", "", one_of("front side top iso"), "where from"),
+    key<&ScenePicture::up>("picture", "up", "", one_of("x y z"), "which axis is up"),
+    key<&ScenePicture::eye>("picture", "eye", "m", kAnything, "where the camera is; with `target`",
+                            "as near as all the motion fits"),
+    key<&ScenePicture::target>("picture", "target", "m", kAnything, "what it looks at"),
+    key<&ScenePicture::field_of_view>("picture", "field_of_view", "degrees", from(0, 150),
+                                      "vertical; 0 is parallel projection"),
+    key<&ScenePicture::size>("picture", "size", "pixels", from(16, 8192), "width and height"),
+    key<&ScenePicture::background>("picture", "background", "", kAnything,
+                                   "`\"#rrggbb\"`, or two from top to bottom: `\"#rrggbb,#rrggbb\"`", "light grey"),
+    key<&ScenePicture::ground>("picture", "ground", "", kAnything,
+                               "whether a level ground, or the lowest point, catches the shadow"),
+    key<&ScenePicture::obstacles>("picture", "obstacles", "", kAnything, "whether they are drawn"),
+    key<&ScenePicture::particles>("picture", "particles", "", kAnything,
+                                  "whether particles are drawn in place of the surface"),
+    key<&ScenePicture::passes>("picture", "passes", "", from(1, 1000), "light directions that are averaged"),
+    key<&ScenePicture::most_triangles>("picture", "most_triangles", "", from(1, 1e9),
+                                       "of a body; a larger one is drawn at a coarser level"),
 };
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
@@ -335,6 +319,16 @@ const SceneKey* find_key(std::string_view table, std::string_view name) {
     for (const SceneKey& key : kKeys)
         if (key.table == table && key.name == name) return &key;
     return nullptr;
+}
+
+double& number_in(Material& material, const SceneKey& key) { return *std::get<double*>(key.place(&material)); }
+
+std::vector<const SceneKey*> material_numbers() {
+    std::vector<const SceneKey*> numbers;
+    Material material;
+    for (const SceneKey& key : kKeys)
+        if (key.is_in(&material) && std::holds_alternative<double*>(key.place(&material))) numbers.push_back(&key);
+    return numbers;
 }
 
 bool is_list(std::string_view table) { return table != "simulation" && table != "world" && table != "picture"; }

@@ -9,9 +9,10 @@
 
 namespace filigree {
 
-/// What a table of the file fills.
-using SceneOwner = std::variant<SceneFile*, SceneBody*, SceneObstacle*, HeatSource*, ScenePair*, SceneFracture*,
-                                SceneCrack*, ScenePin*, SceneForce*, SceneHand*>;
+/// A struct that keys fill. Those of a table fill one or several.
+using SceneOwner =
+    std::variant<SceneFile*, StepOptions*, World*, SceneBody*, ShapeOptions*, Material*, SceneObstacle*, HeatSource*,
+                 ScenePair*, SceneFracture*, SceneCrack*, ScenePin*, SceneForce*, SceneHand*, ScenePicture*>;
 
 /// Where the value of a key goes. Its type says what stands in the file: an enum a word, a Vec3f a colour.
 using KeyPlace =
@@ -38,19 +39,26 @@ struct KeyUse {
 
 struct SceneKey {
     std::string_view table, name;
-    KeyPlace (*place)(SceneOwner); ///< owner: of the key's table
-    KeyPlace (*fresh)();           ///< the same in a struct that no file has filled: the default
+    KeyPlace (*place)(SceneOwner); ///< the member that it fills, in a struct that it is in
+    SceneOwner (*fresh)();         ///< such a struct, filled by no file: its member is the default
     std::string_view unit;         ///< "" where there is none. An angle in degrees is a vector of radians in the struct
     KeyValues values;
     std::string_view text;
     std::string_view unset; ///< what holds without the key, where the fresh struct does not say it
     KeyUse use;
+
+    bool is_in(SceneOwner owner) const { return owner.index() == fresh().index(); }
+    KeyPlace fresh_place() const { return place(fresh()); }
 };
 
 /// In the order of the manual, table by table.
 std::span<const SceneKey> scene_keys();
 /// Null where there is none.
 const SceneKey* find_key(std::string_view table, std::string_view name);
+/// The keys of a material's numbers, and what one of them is in a material.
+std::vector<const SceneKey*> material_numbers();
+double& number_in(Material& material, const SceneKey& key);
+
 /// "[[body]]" or "[world]".
 std::string shown_table(std::string_view table);
 bool is_list(std::string_view table); ///< one of those that may come several times

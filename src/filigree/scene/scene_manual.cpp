@@ -70,8 +70,9 @@ std::string manual_row(const SceneKey& key) {
     each_word(key.use.models, add_use);
     each_word(key.values.words,
               [&](std::string_view word) { range += fmt::format("{}`{}`", range.empty() ? "" : ", ", word); });
-    const std::string type =
-        key.values.words.empty() ? std::visit([](const auto* value) { return type_text(value); }, key.fresh()) : "word";
+    const std::string type = key.values.words.empty()
+                                 ? std::visit([](const auto* value) { return type_text(value); }, key.fresh_place())
+                                 : "word";
     return fmt::format("| `{}` | {} | {} | {} | {} | {}{}{} |\n", key.name, type, key.unit, unset_text(key), range,
                        uses, uses.empty() || key.text.empty() ? "" : ": ", key.text);
 }
@@ -110,7 +111,7 @@ std::string range_text(const KeyValues& values) {
 
 std::string unset_text(const SceneKey& key) {
     if (!key.unset.empty()) return std::string(key.unset);
-    return std::visit([&](const auto* value) { return spelled(key, *value); }, key.fresh());
+    return std::visit([&](const auto* value) { return spelled(key, *value); }, key.fresh_place());
 }
 
 std::string scene_manual() {

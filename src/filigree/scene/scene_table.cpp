@@ -317,7 +317,7 @@ unsigned SceneTable::line(std::string_view key) const { return has(key) ? line_o
 
 void SceneTable::read(SceneOwner owner) const {
     for (const SceneKey& key : scene_keys())
-        if (key.table == name_) read(key.name, owner);
+        if (key.table == name_ && key.is_in(owner)) read(key.name, owner);
 }
 
 void SceneTable::read(std::string_view name, SceneOwner owner) const {

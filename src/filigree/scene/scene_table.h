@@ -24,7 +24,7 @@ public:
     [[noreturn]] void fail(const std::string& what) const { fail_at(path_, line(), what); }
     [[noreturn]] void fail(std::string_view key, const std::string& what) const { fail_at(path_, line(key), what); }
 
-    /// Sets the member of each key that is in the file; the others stay as they are.
+    /// Sets the members of this struct whose keys are in the file; the others stay as they are.
     void read(SceneOwner owner) const;
     /// The same of one key.
     void read(std::string_view key, SceneOwner owner) const;

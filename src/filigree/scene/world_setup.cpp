@@ -167,8 +167,10 @@ private:
             body.model = at_line(scene_, from.line, [&] { return stripped(std::move(mesh), from, *body.body); });
         hash_.add(body.model.driver().vertices);
         body.driver = measure_driver(body.model, *body.body);
-        const std::string coarse = driver_warning(body.driver, body.model, *body.body);
-        if (has_own_driver && !coarse.empty()) warn(called(from) + ": " + coarse);
+        if (!has_own_driver) return body;
+        if (const std::optional<CoarseDriver> coarse = coarse_driver(body.driver, body.model, *body.body))
+            warn(fmt::format("{}: {} (stripped with base {} and max_edge {:.2g}).", called(from), coarse->sentence(),
+                             coarse->base, coarse->max_edge));
         return body;
     }
 
@@ -177,8 +179,11 @@ private:
     }
 
     void warn_of_weight(const SceneBody& from, const Body& body, const Mat3d& turn) {
-        const std::string weight = weight_warning(body, turn, scene_.world.gravity, from.material_name, from.body.size);
-        if (!weight.empty()) warn(called(from) + " " + weight);
+        const OwnWeight weight = own_weight(body, turn, scene_.world.gravity);
+        if (weight.is_too_much())
+            warn(fmt::format("{} {}: {} = {:.1g}, or young_modulus = {:.0e}?", called(from),
+                             weight.sentence(from.material_name), from.body.size ? "size" : "scale",
+                             weight.size_that_does(from.body.size.value_or(body.scale)), weight.modulus_that_does()));
     }
 
     /// The middle of the bodies where it is far from the world's origin, rounded so that taking it off is exact.

@@ -54,21 +54,19 @@ OwnWeight own_weight(const Body& body, const Mat3d& turn, const Vec3d& gravity) 
     if (!(gravity.norm() > 0)) return weight;
     weight.height = extent(body, turn.transpose() * gravity.normalized());
     const Material& of = body.material;
+    weight.young_modulus = of.young_modulus;
     if (of.model == MaterialModel::rigid || is_fluid(of)) return weight;
     weight.strain = of.density * gravity.norm() * weight.height / of.young_modulus;
     if (weight.strain > kMostOwnStrain) weight.smaller = kGoodStrain / weight.strain;
     return weight;
 }
 
-std::string weight_warning(const Body& body, const Mat3d& turn, const Vec3d& gravity, const std::string& material,
-                           std::optional<double> size) {
-    const OwnWeight weight = own_weight(body, turn, gravity);
-    if (!weight.is_too_much()) return "";
-    const std::string stiffer = rounded("%.0e", body.material.young_modulus / weight.smaller);
-    return "is " + rounded("%.2g", weight.height) + " m high and weighs " + mass_text(weight.mass) + "; " + material +
-           " of that size cannot carry itself: " + (size ? "size = " : "scale = ") +
-           rounded("%.1g", one_digit(weight.smaller * size.value_or(body.scale))) + ", or young_modulus = " + stiffer +
-           "?";
+double OwnWeight::size_that_does(double size) const { return one_digit(smaller * size); }
+
+std::string OwnWeight::sentence(const std::string& material) const {
+    if (!is_too_much()) return "";
+    return "is " + rounded("%.2g", height) + " m high and weighs " + mass_text(mass) + "; " + material +
+           " of that size cannot carry itself";
 }
 
 } // namespace filigree
