@@ -24,8 +24,8 @@ if(FILIGREE_NODE AND bundler)
   file(GLOB wasm_standard CONFIGURE_DEPENDS ${wasm_library}/libc++.a)
   if(FILIGREE_WASM_CLANG AND wasm_standard)
     set(decoder_sources ${web}/decoder/decoder.cpp)
-    foreach(name coding/clip_code coding/closed_map coding/connectivity_code coding/driver_code coding/face_code
-                 coding/geometry_code coding/level_reader coding/symbols coding/vertex_rings mesh/edges
+    foreach(name pack/clip_code pack/closed_map pack/connectivity_code pack/driver_code pack/face_code
+                 pack/geometry_code pack/level_reader pack/symbols pack/vertex_rings mesh/edges
                  mesh/triangle_point)
       list(APPEND decoder_sources ${PROJECT_SOURCE_DIR}/src/filigree/${name}.cpp)
     endforeach()
@@ -34,12 +34,13 @@ if(FILIGREE_NODE AND bundler)
     string(JOIN "" decoder_lines ${decoder_lines})
     set(whole_decoder ${CMAKE_CURRENT_BINARY_DIR}/web/decoder.cpp)
     file(CONFIGURE OUTPUT ${whole_decoder} CONTENT "${decoder_lines}" @ONLY)
-    file(GLOB decoder_headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/filigree/coding/*.h)
+    file(GLOB decoder_headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/filigree/pack/*.h)
     find_path(FILIGREE_EIGEN_FOLDER Eigen/Core PATH_SUFFIXES eigen3)
     add_custom_command(
       OUTPUT ${decoder}
       COMMAND ${FILIGREE_WASM_CLANG} --target=wasm32-wasi --sysroot=/usr -mexec-model=reactor -std=c++20 -O3
-              -ffp-contract=off -fno-exceptions -fno-rtti -ffunction-sections -fdata-sections -DNDEBUG -I ${PROJECT_SOURCE_DIR}/src
+              -ffp-contract=off -fno-exceptions -fno-rtti -ffunction-sections -fdata-sections -DNDEBUG
+              -I ${PROJECT_SOURCE_DIR}/include -I ${PROJECT_SOURCE_DIR}/src
               -nostdinc++ -isystem /usr/lib/llvm-16/include/wasm32-wasi/c++/v1 -isystem /usr/include/wasm32-wasi
               -isystem ${FILIGREE_EIGEN_FOLDER} ${whole_decoder} -o ${decoder} -L${wasm_library} -L/usr/lib/wasm32-wasi
               -Wl,--gc-sections -Wl,--strip-all

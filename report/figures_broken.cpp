@@ -3,8 +3,8 @@
 #include "figures.h"
 #include "figures_layout.h"
 
+#include "filigree/blend/pose_mesh.h"
 #include "filigree/core/text.h"
-#include "filigree/hierarchy/pose_mesh.h"
 #include "filigree/scene/scene_run.h"
 
 #include <fmt/format.h>

@@ -2,8 +2,8 @@
 #include "figures.h"
 #include "figures_layout.h"
 
+#include "filigree/blend/blend_code.h"
 #include "filigree/core/text.h"
-#include "filigree/hierarchy/blend_code.h"
 #include "filigree/melting/particle_field.h"
 #include "filigree/mesh.h"
 #include "filigree/mesh/surfels.h"

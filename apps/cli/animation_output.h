@@ -4,8 +4,8 @@
 #include "session.h"
 
 #include "filigree/file.h"
-#include "filigree/io/model_chunks.h"
-#include "filigree/io/point_cache.h"
+#include "filigree/io/animation/point_cache.h"
+#include "filigree/io/model/model_chunks.h"
 #include "filigree/restore.h"
 
 namespace filigree::cli {

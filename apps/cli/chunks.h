@@ -3,7 +3,7 @@
 
 #include "session.h"
 
-#include "filigree/io/shared_work.h"
+#include "filigree/io/system/shared_work.h"
 
 #include <string>
 

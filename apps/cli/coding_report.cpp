@@ -1,7 +1,7 @@
 #include "coding_report.h"
 
 #include "filigree/core/text.h"
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
 
 #include <fmt/format.h>
 

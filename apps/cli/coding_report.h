@@ -3,7 +3,7 @@
 
 #include "report.h"
 
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
 
 #include <optional>
 

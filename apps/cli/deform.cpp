@@ -5,8 +5,8 @@
 #include "restore_options.h"
 
 #include "filigree/deform/warp_steps.h"
-#include "filigree/io/file.h"
-#include "filigree/io/handles_file.h"
+#include "filigree/io/animation/handles_file.h"
+#include "filigree/io/system/file.h"
 
 #include <fmt/format.h>
 

@@ -6,11 +6,11 @@
 #include "web_page.h"
 
 #include "filigree/file.h"
-#include "filigree/io/file.h"
-#include "filigree/io/gltf.h"
-#include "filigree/io/material_file.h"
-#include "filigree/io/model_file.h"
-#include "filigree/io/point_cache.h"
+#include "filigree/io/animation/point_cache.h"
+#include "filigree/io/gltf/gltf.h"
+#include "filigree/io/mesh/material_file.h"
+#include "filigree/io/model/model_file.h"
+#include "filigree/io/system/file.h"
 
 #include <filesystem>
 

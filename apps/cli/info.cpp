@@ -2,9 +2,9 @@
 #include "commands.h"
 #include "session.h"
 
-#include "filigree/io/file.h"
-#include "filigree/io/gltf.h"
-#include "filigree/io/model_file.h"
+#include "filigree/io/gltf/gltf.h"
+#include "filigree/io/model/model_file.h"
+#include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
 #include "filigree/pose.h"
 #include "filigree/remesh/quad_quality.h"

@@ -2,8 +2,8 @@
 
 #include "session.h"
 
-#include "filigree/hierarchy/pose_mesh.h"
-#include "filigree/io/file.h"
+#include "filigree/blend/pose_mesh.h"
+#include "filigree/io/system/file.h"
 
 namespace filigree::cli {
 

@@ -3,8 +3,8 @@
 
 #include "session.h"
 
-#include "filigree/io/file_batch.h"
-#include "filigree/io/new_folders.h"
+#include "filigree/io/system/file_batch.h"
+#include "filigree/io/system/new_folders.h"
 
 #include <algorithm>
 #include <filesystem>

@@ -2,8 +2,8 @@
 #include "commands.h"
 #include "session.h"
 
-#include "filigree/io/file.h"
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
+#include "filigree/io/system/file.h"
 #include "filigree/pack.h"
 #include "filigree/strip.h"
 

@@ -1,7 +1,7 @@
 #include "pictures.h"
 
 #include "filigree/core/color.h"
-#include "filigree/io/file.h"
+#include "filigree/io/system/file.h"
 #include "filigree/mesh/up_axis.h"
 
 #include <filesystem>

@@ -3,7 +3,7 @@
 
 #include "session.h"
 
-#include "filigree/io/extension.h"
+#include "filigree/io/system/extension.h"
 #include "filigree/present/headless_renderer.h"
 #include "filigree/render.h"
 #include "filigree/render/surface_materials.h"

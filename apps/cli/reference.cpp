@@ -3,7 +3,7 @@
 #include "report.h"
 
 #include "filigree/core/now_seconds.h"
-#include "filigree/io/file.h"
+#include "filigree/io/system/file.h"
 #include "filigree/reference/height_law.h"
 
 #include <fmt/format.h>

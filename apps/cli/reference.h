@@ -3,8 +3,8 @@
 
 #include "session.h"
 
-#include "filigree/io/file.h"
-#include "filigree/io/reference_file.h"
+#include "filigree/io/model/reference_file.h"
+#include "filigree/io/system/file.h"
 
 namespace filigree::cli {
 

@@ -2,7 +2,7 @@
 #include "commands.h"
 #include "rendering.h"
 
-#include "filigree/io/numbered_name.h"
+#include "filigree/io/system/numbered_name.h"
 
 #include <algorithm>
 #include <charconv>

@@ -2,9 +2,9 @@
 #include "chunks.h"
 #include "rendering.h"
 
-#include "filigree/io/file_batch.h"
-#include "filigree/io/file_error.h"
-#include "filigree/io/numbered_name.h"
+#include "filigree/io/system/file_batch.h"
+#include "filigree/io/system/file_error.h"
+#include "filigree/io/system/numbered_name.h"
 #include "filigree/present/film_frames.h"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 #include "rendering.h"
-#include "filigree/hierarchy/blend_code.h"
-#include "filigree/io/file.h"
+#include "filigree/blend/blend_code.h"
+#include "filigree/io/system/file.h"
 
 #include <utility>
 

@@ -4,7 +4,7 @@
 #include "report.h"
 #include "session.h"
 
-#include "filigree/hierarchy/pose_mesh.h"
+#include "filigree/blend/pose_mesh.h"
 #include "filigree/restore.h"
 
 namespace filigree::cli {

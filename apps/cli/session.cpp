@@ -1,7 +1,7 @@
 #include "session.h"
 
-#include "filigree/io/file.h"
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
+#include "filigree/io/system/file.h"
 
 #include <algorithm>
 #include <csignal>

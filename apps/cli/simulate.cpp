@@ -2,10 +2,10 @@
 #include "commands.h"
 #include "simulate_report.h"
 
-#include "filigree/io/extension.h"
-#include "filigree/io/file.h"
-#include "filigree/io/numbered_name.h"
-#include "filigree/io/point_cache.h"
+#include "filigree/io/animation/point_cache.h"
+#include "filigree/io/system/extension.h"
+#include "filigree/io/system/file.h"
+#include "filigree/io/system/numbered_name.h"
 #include "filigree/present/scene_film.h"
 #include "filigree/present/textured_look.h"
 #include "filigree/scene/finer_check.h"
@@ -304,8 +304,8 @@ private:
     void open_outputs() {
         if (!outputs_.films.empty()) renderer_.emplace(require(HeadlessRenderer::create()));
         for (const std::string& path : outputs_.films)
-            films_.push_back(require(
-                FilmWriter::create(path, scene_.picture.size[0], scene_.picture.size[1], scene_.step.frames_per_second)));
+            films_.push_back(require(FilmWriter::create(path, scene_.picture.size[0], scene_.picture.size[1],
+                                                        scene_.step.frames_per_second)));
     }
 
     void save() { require(write_file(options_.save, run_->save())); }

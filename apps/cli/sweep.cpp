@@ -3,10 +3,10 @@
 #include "commands.h"
 #include "simulate_report.h"
 
-#include "filigree/io/extension.h"
-#include "filigree/io/file.h"
-#include "filigree/io/file_error.h"
-#include "filigree/io/temporary_file.h"
+#include "filigree/io/system/extension.h"
+#include "filigree/io/system/file.h"
+#include "filigree/io/system/file_error.h"
+#include "filigree/io/system/temporary_file.h"
 
 #include <algorithm>
 #include <charconv>

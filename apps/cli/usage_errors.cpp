@@ -1,6 +1,6 @@
 #include "usage_errors.h"
 
-#include "filigree/io/extension.h"
+#include "filigree/io/system/extension.h"
 #include "filigree/scene/scene_keys.h"
 
 #include <cctype>

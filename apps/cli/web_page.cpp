@@ -1,6 +1,6 @@
 #include "web_page.h"
 
-#include "filigree/io/file.h"
+#include "filigree/io/system/file.h"
 
 #include <cstdlib>
 #include <fstream>

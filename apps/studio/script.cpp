@@ -1,6 +1,6 @@
 #include "script.h"
 
-#include "filigree/io/file.h"
+#include "filigree/io/system/file.h"
 
 #include <QAbstractButton>
 #include <QAbstractSlider>

@@ -4,12 +4,12 @@
 #include "pins.h"
 #include "words.h"
 
+#include "filigree/blend/pose_mesh.h"
 #include "filigree/file.h"
-#include "filigree/hierarchy/pose_mesh.h"
-#include "filigree/io/file.h"
-#include "filigree/io/model_file.h"
-#include "filigree/io/numbered_name.h"
-#include "filigree/io/point_cache.h"
+#include "filigree/io/animation/point_cache.h"
+#include "filigree/io/model/model_file.h"
+#include "filigree/io/system/file.h"
+#include "filigree/io/system/numbered_name.h"
 #include "filigree/pack.h"
 #include "filigree/present/model_film.h"
 

@@ -1,11 +1,11 @@
 // Animations in and out, as a user makes them: restore --poses and --frames, deform --frames, simulate.
 #include "apps/program.h"
-#include "hierarchy/part_meshes.h"
+#include "blend/part_meshes.h"
 #include "threads.h"
 
 #include "filigree/file.h"
-#include "filigree/io/model_file.h"
-#include "filigree/io/point_cache.h"
+#include "filigree/io/animation/point_cache.h"
+#include "filigree/io/model/model_file.h"
 #include "filigree/mesh.h"
 #include "filigree/restore.h"
 #include "filigree/strip.h"

@@ -3,8 +3,8 @@
 #include "cases.h"
 #include "threads.h"
 
-#include "filigree/io/model_file.h"
-#include "filigree/io/point_cache.h"
+#include "filigree/io/animation/point_cache.h"
+#include "filigree/io/model/model_file.h"
 #include "filigree/mesh.h"
 #include "filigree/strip.h"
 
@@ -297,7 +297,7 @@ protected:
             if (ran.code == 0 && step == 1) break;
             ASSERT_TRUE(ran.code == 0 || ran.code == -1) << ran.err;
             const auto shown = in_place("a");
-            const bool is_being_placed = has_batch("a"); // which the next run completes, see io/file_batch.h
+            const bool is_being_placed = has_batch("a"); // which the next run completes, see io/system/file_batch.h
             EXPECT_TRUE(shown == old || shown == whole || is_being_placed) << "killed before call " << number;
             if (ran.code == 0) {
                 ASSERT_EQ(shown, whole);

@@ -3,7 +3,7 @@
 #include "sanitized.h"
 
 #include "filigree/file.h"
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
 #include "filigree/restore.h"
 #include "filigree/strip.h"
 

@@ -2,8 +2,8 @@
 #include "apps/program.h"
 #include "threads.h"
 
-#include "filigree/io/model_file.h"
-#include "filigree/io/point_cache.h"
+#include "filigree/io/animation/point_cache.h"
+#include "filigree/io/model/model_file.h"
 
 using namespace filigree;
 using namespace filigree_test;

@@ -3,7 +3,7 @@
 #include "threads.h"
 
 #include "filigree/file.h"
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
 #include "filigree/mesh.h"
 #include "filigree/render.h"
 #include "filigree/restore.h"

@@ -4,7 +4,7 @@
 #include "threads.h"
 
 #include "filigree/file.h"
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
 #include "filigree/physics/simulation.h"
 #include "filigree/render.h"
 

@@ -1,9 +1,9 @@
 #include "filigree/pose.h"
 
+#include "blend/part_meshes.h"
 #include "filigree/deform/restored_error.h"
 #include "filigree/mesh.h"
 #include "filigree/restore.h"
-#include "hierarchy/part_meshes.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

@@ -2,7 +2,7 @@
 #include "fuzz.h"
 #include "temporary.h"
 
-#include "filigree/io/point_cache.h"
+#include "filigree/io/animation/point_cache.h"
 #include "filigree/mesh.h"
 
 #include <algorithm>

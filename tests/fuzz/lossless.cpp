@@ -1,8 +1,8 @@
 // The lossless code: any words, faces, values and records come back; damaged streams are refused or give as many.
 #include "fuzz.h"
 
-#include "filigree/coding/lossless_corners.h"
-#include "filigree/coding/lossless_numbers.h"
+#include "filigree/pack/lossless_corners.h"
+#include "filigree/pack/lossless_numbers.h"
 
 #include <algorithm>
 

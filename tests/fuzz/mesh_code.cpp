@@ -2,8 +2,8 @@
 // refused or give a sound mesh.
 #include "fuzz.h"
 
-#include "filigree/coding/mesh_code.h"
 #include "filigree/mesh.h"
+#include "filigree/pack/mesh_code.h"
 
 using namespace filigree_fuzz;
 

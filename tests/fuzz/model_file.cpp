@@ -2,11 +2,11 @@
 // say. Checksums are mended first, or no change would get past them.
 #include "fuzz.h"
 
-#include "filigree/io/file.h"
-#include "filigree/io/model_chunks.h"
-#include "filigree/io/model_file.h"
-#include "filigree/io/model_sections.h"
-#include "filigree/io/reference_file.h"
+#include "filigree/io/model/model_chunks.h"
+#include "filigree/io/model/model_file.h"
+#include "filigree/io/model/model_sections.h"
+#include "filigree/io/model/reference_file.h"
+#include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
 #include "filigree/restore.h"
 #include "filigree/strip.h"

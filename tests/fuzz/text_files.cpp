@@ -2,8 +2,8 @@
 #include "fuzz.h"
 #include "temporary.h"
 
-#include "filigree/io/handles_file.h"
-#include "filigree/io/material_file.h"
+#include "filigree/io/animation/handles_file.h"
+#include "filigree/io/mesh/material_file.h"
 #include "filigree/scene/scene_file.h"
 
 using namespace filigree_fuzz;

@@ -1,6 +1,6 @@
 // Models packed in few bits and read again.
-#include "filigree/io/file.h"
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
+#include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
 #include "filigree/restore.h"
 #include "filigree/strip.h"

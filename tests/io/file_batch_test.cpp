@@ -1,6 +1,6 @@
-#include "filigree/io/file_batch.h"
+#include "filigree/io/system/file_batch.h"
 
-#include "filigree/io/file.h"
+#include "filigree/io/system/file.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-#include "filigree/io/file.h"
-#include "filigree/io/temporary_file.h"
+#include "filigree/io/system/file.h"
+#include "filigree/io/system/temporary_file.h"
 
 #include <gtest/gtest.h>
 

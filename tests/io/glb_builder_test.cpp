@@ -1,6 +1,6 @@
-#include "filigree/io/glb_builder.h"
+#include "filigree/io/gltf/glb_builder.h"
 
-#include "filigree/io/file.h"
+#include "filigree/io/system/file.h"
 
 #include <gtest/gtest.h>
 

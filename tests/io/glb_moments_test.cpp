@@ -1,6 +1,6 @@
 // Key frames of a mesh whose faces change, as plain glTF.
-#include "filigree/io/file.h"
-#include "filigree/io/point_cache.h"
+#include "filigree/io/animation/point_cache.h"
+#include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
 #include "threads.h"
 

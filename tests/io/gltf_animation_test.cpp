@@ -1,5 +1,5 @@
 // glTF skins, morph targets and animations, evaluated; numbers by hand, or from a script that shares no code with us.
-#include "filigree/io/gltf.h"
+#include "filigree/io/gltf/gltf.h"
 #include "io/corpus.h"
 #include "io/gltf_text.h"
 

@@ -2,9 +2,9 @@
 // says.
 #include "filigree/file.h"
 
-#include "filigree/io/file.h"
-#include "filigree/io/gltf.h"
-#include "filigree/io/point_cache.h"
+#include "filigree/io/animation/point_cache.h"
+#include "filigree/io/gltf/gltf.h"
+#include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
 #include "filigree/pose.h"
 #include "filigree/strip.h"

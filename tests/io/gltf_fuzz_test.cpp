@@ -1,6 +1,6 @@
 // Damaged glTF: whatever happens to its bytes and numbers, reading and evaluating end, with a mesh or with a sentence.
-#include "filigree/io/file.h"
-#include "filigree/io/gltf.h"
+#include "filigree/io/gltf/gltf.h"
+#include "filigree/io/system/file.h"
 #include "io/corpus.h"
 #include "io/gltf_text.h"
 

@@ -1,5 +1,5 @@
 #include "filigree/file.h"
-#include "filigree/io/file.h"
+#include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
 #include "filigree/strip.h"
 

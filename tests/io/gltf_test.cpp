@@ -1,7 +1,7 @@
 // Reading glTF: nodes, primitives, attributes, materials, and our own files again.
 #include "filigree/file.h"
-#include "filigree/io/file.h"
-#include "filigree/io/gltf.h"
+#include "filigree/io/gltf/gltf.h"
+#include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
 #include "io/corpus.h"
 #include "io/gltf_text.h"

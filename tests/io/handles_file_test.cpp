@@ -1,6 +1,6 @@
-#include "filigree/io/handles_file.h"
+#include "filigree/io/animation/handles_file.h"
 
-#include "filigree/io/file.h"
+#include "filigree/io/system/file.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

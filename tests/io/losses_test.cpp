@@ -1,4 +1,4 @@
-#include "filigree/io/losses.h"
+#include "filigree/io/mesh/losses.h"
 
 #include "filigree/mesh.h"
 

@@ -1,7 +1,7 @@
 // Any mesh, with any attributes that a format holds, written and read back; and every pair of formats in a row.
 #include "corpus.h"
 #include "filigree/file.h"
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
 #include "filigree/mesh.h"
 #include "filigree/strip.h"
 

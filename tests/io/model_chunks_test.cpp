@@ -1,9 +1,9 @@
 // Models that stay in their files: chunk by chunk the same bytes as the whole.
-#include "filigree/io/file.h"
-#include "filigree/io/model_chunks.h"
+#include "filigree/io/model/model_chunks.h"
+#include "filigree/io/system/file.h"
 
-#include "filigree/io/model_file.h"
-#include "filigree/io/reference_file.h"
+#include "filigree/io/model/model_file.h"
+#include "filigree/io/model/reference_file.h"
 #include "filigree/mesh.h"
 #include "filigree/strip.h"
 #include "threads.h"

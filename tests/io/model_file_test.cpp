@@ -1,9 +1,9 @@
 // Model files: they come back as they were, and whatever happens to their bytes ends in a sound model or a sentence.
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
 
-#include "filigree/io/file.h"
-#include "filigree/io/model_sections.h"
-#include "filigree/io/reference_file.h"
+#include "filigree/io/model/model_sections.h"
+#include "filigree/io/model/reference_file.h"
+#include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
 #include "filigree/restore.h"
 #include "filigree/strip.h"

@@ -1,5 +1,5 @@
 // Poses in model files: they come back to the bit, other programs' readers pass over them, and damage is refused.
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
 
 #include "filigree/mesh.h"
 #include "filigree/strip.h"

@@ -1,6 +1,6 @@
 // Streams: the mesh gets better with every byte, however the bytes come; the whole file is a model with its poses.
-#include "filigree/io/file.h"
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
+#include "filigree/io/system/file.h"
 #include "filigree/pack.h"
 
 #include "filigree/mesh.h"

@@ -1,4 +1,4 @@
-#include "filigree/io/numbered_name.h"
+#include "filigree/io/system/numbered_name.h"
 
 #include <gtest/gtest.h>
 

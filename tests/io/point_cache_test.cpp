@@ -1,9 +1,9 @@
-#include "filigree/io/point_cache.h"
+#include "filigree/io/animation/point_cache.h"
 
+#include "filigree/blend/pose_mesh.h"
 #include "filigree/file.h"
-#include "filigree/hierarchy/pose_mesh.h"
-#include "filigree/io/file.h"
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
+#include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
 #include "filigree/strip.h"
 #include "io/gltf_text.h"

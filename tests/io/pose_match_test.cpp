@@ -1,8 +1,8 @@
-#include "filigree/io/pose_match.h"
+#include "filigree/io/animation/pose_match.h"
 
 #include "filigree/file.h"
-#include "filigree/io/file.h"
-#include "filigree/io/point_cache.h"
+#include "filigree/io/animation/point_cache.h"
+#include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
 #include "io/gltf_text.h"
 #include "threads.h"

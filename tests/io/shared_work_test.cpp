@@ -1,7 +1,7 @@
 // A folder in which the parts of a work gather, while others finish it.
-#include "filigree/io/shared_work.h"
+#include "filigree/io/system/shared_work.h"
 
-#include "filigree/io/file.h"
+#include "filigree/io/system/file.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

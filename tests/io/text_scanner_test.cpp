@@ -1,5 +1,5 @@
-#include "filigree/io/text_scanner.h"
-#include "filigree/io/text_writer.h"
+#include "filigree/io/system/text_scanner.h"
+#include "filigree/io/system/text_writer.h"
 
 #include <gtest/gtest.h>
 #include <optional>

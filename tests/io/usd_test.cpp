@@ -1,6 +1,6 @@
 // USD text, read back by a reader that knows only the grammar of what is asked for.
-#include "filigree/io/file.h"
-#include "filigree/io/point_cache.h"
+#include "filigree/io/animation/point_cache.h"
+#include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
 #include "threads.h"
 

@@ -1,10 +1,10 @@
 // What has to come out the same two ways, on random meshes: threads, order, place, precision, file and memory.
 // rapidcheck prints the seed of a failure; scripts/properties tries many more.
-#include "filigree/coding/mesh_code.h"
 #include "filigree/fracture.h"
-#include "filigree/io/file.h"
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
+#include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
+#include "filigree/pack/mesh_code.h"
 #include "filigree/physics/simulation.h"
 #include "filigree/restore.h"
 #include "filigree/sample.h"

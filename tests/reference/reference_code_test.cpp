@@ -1,8 +1,8 @@
+#include "blend/stripping.h"
 #include "cases.h"
 #include "filigree/mesh.h"
 #include "filigree/reference/height_law.h"
 #include "filigree/reference/reference_code.h"
-#include "hierarchy/stripping.h"
 #include "threads.h"
 
 #include <Eigen/Geometry>

@@ -1,10 +1,10 @@
 // A mesh stripped by the report's method as a model: its levels, its restoring, what is refused.
 #include "filigree/reference.h"
 
+#include "blend/stripping.h"
 #include "broken_meshes.h"
 #include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
-#include "hierarchy/stripping.h"
 
 namespace {
 

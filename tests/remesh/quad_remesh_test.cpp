@@ -2,10 +2,10 @@
 #include "filigree/remesh.h"
 #include "filigree/remesh/manifold_surface.h"
 
+#include "blend/stripping.h"
 #include "filigree/mesh.h"
 #include "filigree/reference.h"
 #include "grids.h"
-#include "hierarchy/stripping.h"
 #include "manifold_check.h"
 
 namespace filigree {

@@ -1,6 +1,6 @@
 #include "filigree/render.h"
 
-#include "filigree/io/file.h"
+#include "filigree/io/system/file.h"
 
 #include <algorithm>
 #include <cmath>

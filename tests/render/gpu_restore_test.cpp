@@ -1,12 +1,12 @@
 // Restoring in the vertex shader gives what the CPU gives.
 #include "filigree/render/gpu_restore.h"
 
+#include "blend/stripping.h"
 #include "filigree/file.h"
 #include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/pose.h"
 #include "filigree/render.h"
-#include "hierarchy/stripping.h"
 #include "io/corpus.h"
 
 #include <algorithm>

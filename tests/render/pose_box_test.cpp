@@ -1,9 +1,9 @@
 // The box of a posed model: never smaller than what it holds, and not much larger.
 #include "filigree/render/pose_box.h"
 
+#include "blend/stripping.h"
 #include "filigree/mesh.h"
 #include "filigree/pose.h"
-#include "hierarchy/stripping.h"
 
 #include <numbers>
 #include <numeric>

@@ -1,9 +1,9 @@
 // What tests of pictures share: a renderer without a window, and scenes.
 #pragma once
 
+#include "blend/stripping.h"
 #include "filigree/mesh.h"
 #include "filigree/render.h"
-#include "hierarchy/stripping.h"
 
 #include <gtest/gtest.h>
 

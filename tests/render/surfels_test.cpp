@@ -1,6 +1,6 @@
 // What surfels cover of a surface, as seen from four sides.
+#include "filigree/blend/blend_code.h"
 #include "filigree/file.h"
-#include "filigree/hierarchy/blend_code.h"
 #include "filigree/pose.h"
 #include "render/rendered.h"
 #include "render/surfel_coverage.h"

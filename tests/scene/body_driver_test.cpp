@@ -1,7 +1,7 @@
 // The driver that a body gets by default, what is said of another, and the errors that follow from both.
 #include "filigree/scene/body_driver.h"
 
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
 #include "filigree/scene/finer_check.h"
 #include "scene/scenes.h"
 #include "threads.h"

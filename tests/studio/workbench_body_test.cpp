@@ -3,7 +3,7 @@
 
 #include "studio/materials.h"
 
-#include "filigree/io/file.h"
+#include "filigree/io/system/file.h"
 
 #include <QSignalSpy>
 #include <QTest>

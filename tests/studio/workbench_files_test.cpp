@@ -3,8 +3,8 @@
 #include "workbench_fixture.h"
 
 #include "filigree/file.h"
-#include "filigree/io/file.h"
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
+#include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
 #include "filigree/render.h"
 #include "filigree/strip.h"

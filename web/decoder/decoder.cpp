@@ -1,10 +1,10 @@
 // What the page calls: a stream's sections in, levels, skins and poses out. Compiled to WebAssembly from the library's
 // own decoder, so both read the same integers. Sections lie where take() says; results lie in memory that stays valid
 // until the next call that changes them.
-#include "filigree/coding/clip_code.h"
-#include "filigree/coding/driver_code.h"
-#include "filigree/coding/level_reader.h"
 #include "filigree/mesh/triangle_point.h"
+#include "filigree/pack/clip_code.h"
+#include "filigree/pack/driver_code.h"
+#include "filigree/pack/level_reader.h"
 
 #include <cmath>
 #include <memory>

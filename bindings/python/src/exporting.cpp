@@ -1,7 +1,7 @@
 #include "models.h"
 
 #include <filigree/file.h>
-#include <filigree/io/point_cache.h>
+#include <filigree/io/animation/point_cache.h>
 
 namespace filigree::python {
 

@@ -1,8 +1,8 @@
 #include "models.h"
 
 #include <filigree/file.h>
-#include <filigree/io/model_file.h>
-#include <filigree/io/point_cache.h>
+#include <filigree/io/animation/point_cache.h>
+#include <filigree/io/model/model_file.h>
 
 namespace filigree::python {
 

@@ -1,6 +1,6 @@
 #include "models.h"
 
-#include <filigree/io/handles_file.h>
+#include <filigree/io/animation/handles_file.h>
 #include <filigree/mesh.h>
 #include <filigree/pose.h>
 

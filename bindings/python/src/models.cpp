@@ -1,6 +1,6 @@
 #include "models.h"
 
-#include <filigree/io/model_file.h>
+#include <filigree/io/model/model_file.h>
 #include <filigree/pose.h>
 
 namespace filigree::python {

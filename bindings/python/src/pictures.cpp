@@ -1,6 +1,6 @@
 #include "models.h"
 
-#include <filigree/io/file.h>
+#include <filigree/io/system/file.h>
 #include <filigree/mesh/up_axis.h>
 #include <filigree/present/headless_renderer.h>
 #include <filigree/render.h>

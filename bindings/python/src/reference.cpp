@@ -1,7 +1,7 @@
 #include "models.h"
 
-#include <filigree/io/file.h>
-#include <filigree/io/reference_file.h>
+#include <filigree/io/model/reference_file.h>
+#include <filigree/io/system/file.h>
 
 namespace filigree::python {
 

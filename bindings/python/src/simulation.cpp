@@ -3,8 +3,8 @@
 #include "calls.h"
 #include "models.h"
 
-#include <filigree/physics/grid/grid_limits.h>
 #include <filigree/physics/body/own_weight.h>
+#include <filigree/physics/grid/grid_limits.h>
 
 #include <cstdio>
 

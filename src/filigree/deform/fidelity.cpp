@@ -1,7 +1,7 @@
 #include "filigree/pose.h"
 
-#include "filigree/hierarchy/gradient_fit.h"
-#include "filigree/hierarchy/sampled_restorer.h"
+#include "filigree/blend/gradient_fit.h"
+#include "filigree/blend/sampled_restorer.h"
 #include "filigree/mesh.h"
 #include "filigree/restore.h"
 

@@ -1,7 +1,7 @@
 #include "filigree/pose.h"
 
-#include "filigree/hierarchy/blend_code.h"
-#include "filigree/hierarchy/pose_mesh.h"
+#include "filigree/blend/blend_code.h"
+#include "filigree/blend/pose_mesh.h"
 #include "filigree/mesh.h"
 #include "filigree/mesh/weld.h"
 #include "filigree/restore.h"

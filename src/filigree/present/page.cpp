@@ -3,7 +3,7 @@
 #include "filigree/present/page.h"
 
 #include "filigree/core/text.h"
-#include "filigree/io/file.h"
+#include "filigree/io/system/file.h"
 
 #include <algorithm>
 #include <array>

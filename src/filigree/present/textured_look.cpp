@@ -1,8 +1,8 @@
 #include "filigree/present/textured_look.h"
 
 #include "filigree/core/srgb.h"
-#include "filigree/io/file.h"
-#include "filigree/io/material_file.h"
+#include "filigree/io/mesh/material_file.h"
+#include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
 #include "filigree/render/surface_materials.h"
 

@@ -1,12 +1,12 @@
 #include "filigree/render.h"
 
-#include "filigree/io/extension.h"
-#include "filigree/io/file.h"
-#include "filigree/io/file_batch.h"
-#include "filigree/io/file_descriptor.h"
-#include "filigree/io/file_error.h"
-#include "filigree/io/numbered_name.h"
-#include "filigree/io/temporary_file.h"
+#include "filigree/io/system/extension.h"
+#include "filigree/io/system/file.h"
+#include "filigree/io/system/file_batch.h"
+#include "filigree/io/system/file_descriptor.h"
+#include "filigree/io/system/file_error.h"
+#include "filigree/io/system/numbered_name.h"
+#include "filigree/io/system/temporary_file.h"
 
 #include <algorithm>
 #include <cerrno>

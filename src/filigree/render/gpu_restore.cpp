@@ -1,7 +1,7 @@
 #include "filigree/render/gpu_restore.h"
 
-#include "filigree/hierarchy/blend_code.h"
-#include "filigree/hierarchy/blend_kernel.h"
+#include "filigree/blend/blend_code.h"
+#include "filigree/blend/blend_kernel.h"
 #include "filigree/render/gl_objects.h"
 #include "filigree/render/octahedron.h"
 #include "filigree/render/shaders.h"

@@ -1,4 +1,4 @@
-#include "filigree/io/file.h"
+#include "filigree/io/system/file.h"
 #include "filigree/render.h"
 
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "filigree/render/surface_materials.h"
 
-#include "filigree/io/material_file.h"
+#include "filigree/io/mesh/material_file.h"
 
 #include <map>
 

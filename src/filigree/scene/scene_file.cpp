@@ -2,8 +2,8 @@
 
 #include "filigree/core/random.h"
 #include "filigree/file.h"
-#include "filigree/io/file.h"
-#include "filigree/io/model_file.h"
+#include "filigree/io/model/model_file.h"
+#include "filigree/io/system/file.h"
 #include "filigree/physics/material.h"
 #include "filigree/scene/scene_table.h"
 

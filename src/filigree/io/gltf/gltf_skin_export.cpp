@@ -1,0 +1,295 @@
+// Skins: the layout of nodes and why it is like this are in docs/exchange.md.
+#include "filigree/file.h"
+
+#include "filigree/io/gltf/glb_levels.h"
+#include "filigree/io/gltf/glb_parts.h"
+#include "filigree/io/gltf/glb_skin_animation.h"
+#include "filigree/io/gltf/gltf.h"
+#include "filigree/io/gltf/gltf_export_error.h"
+#include "filigree/io/mesh/losses.h"
+#include "filigree/mesh/normals.h"
+#include "filigree/restore.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <new>
+
+namespace filigree {
+
+namespace {
+
+using Json = GlbBuilder::Json;
+
+std::vector<float> json_numbers(const Vec3d& v) { return {float(v[0]), float(v[1]), float(v[2])}; }
+
+/// What a level looks like when it is skinned: its positions are the skin's, and it has normals unless they are not
+/// wanted.
+void make_skinned(Mesh& mesh, const Skin& skin, ExportNormals normals, const RunContext& context) {
+    if (normals == ExportNormals::leave)
+        mesh.normals = {};
+    else if (mesh.normals.empty())
+        mesh.normals.values = vertex_normals(mesh, mesh.positions, context);
+    mesh.positions = skin.positions;
+}
+
+std::string narrow_joints(std::span<const Index> joints, std::size_t first, const GlbParts& parts, std::size_t slots,
+                          bool bytes) {
+    std::vector<std::uint8_t> small;
+    std::vector<std::uint16_t> large;
+    for (std::size_t v = 0; v < parts.vertex_count(); ++v)
+        for (std::size_t k = 0; k < 4; ++k) {
+            const Index joint = joints[parts.source(v) * slots + first + k];
+            if (bytes)
+                small.push_back(static_cast<std::uint8_t>(joint));
+            else
+                large.push_back(static_cast<std::uint16_t>(joint));
+        }
+    return bytes ? bytes_of(std::span<const std::uint8_t>(small)) : bytes_of(std::span<const std::uint16_t>(large));
+}
+
+std::string packed_weights(std::span<const float> weights, std::size_t first, const GlbParts& parts, std::size_t slots,
+                           bool exact) {
+    std::vector<float> floats;
+    std::vector<std::uint16_t> steps;
+    for (std::size_t v = 0; v < parts.vertex_count(); ++v)
+        for (std::size_t k = 0; k < 4; ++k) {
+            const float weight = weights[parts.source(v) * slots + first + k];
+            if (exact)
+                floats.push_back(weight);
+            else
+                steps.push_back(static_cast<std::uint16_t>(std::lround(65535 * weight)));
+        }
+    return exact ? bytes_of(std::span<const float>(floats)) : bytes_of(std::span<const std::uint16_t>(steps));
+}
+
+/// JOINTS_n and WEIGHTS_n, four influences each.
+void add_influences(GlbBuilder& builder, const GlbParts& parts, const Skin& skin, bool exact, Json& attributes) {
+    const bool bytes = skin.joints.size() <= 256;
+    for (std::size_t set = 0; 4 * set < skin.slots; ++set) {
+        GltfAccessor joints{.component = bytes ? GltfComponent::uint8 : GltfComponent::uint16,
+                            .type = "VEC4",
+                            .target = GltfTarget::vertices,
+                            .count = parts.vertex_count()};
+        GltfAccessor weights{.component = exact ? GltfComponent::float32 : GltfComponent::uint16,
+                             .type = "VEC4",
+                             .normalized = !exact,
+                             .target = GltfTarget::vertices,
+                             .count = parts.vertex_count()};
+        const std::string number = std::to_string(set);
+        attributes["JOINTS_" + number] =
+            builder.add(joints, narrow_joints(skin.vertex_joints, 4 * set, parts, skin.slots, bytes));
+        attributes["WEIGHTS_" + number] =
+            builder.add(weights, packed_weights(skin.vertex_weights, 4 * set, parts, skin.slots, exact));
+    }
+}
+
+/// Puts one skinned file together.
+class SkinExport {
+public:
+    SkinExport(const Model& model, const FrameSource<Pose>& poses, const SkinOptions& options,
+               const RunContext& context)
+        : model_(model), poses_(poses), options_(options), context_(context), levels_(model, options.materials_beside) {
+    }
+
+    Result<ExportReport> write(const std::filesystem::path& path) {
+        if (Status fine = check(); !fine) return fine.error();
+        const unsigned level = restored_level(model_, options_.restore).value();
+        Result<Restorer> restorer = Restorer::create(model_, options_.restore, context_);
+        if (!restorer) return restorer.error();
+        PoseSampler poses(poses_, [&](const Pose& pose) { return check_pose(model_, pose); });
+
+        if (options_.compress) builder_.round_positions();
+        Skin skin;
+        for (unsigned k = level + 1; k-- > 0;) {
+            if (k < level && !options_.all_levels) break;
+            Result<Skin> made = make_skin(model_, k, options_.influences, options_.full_precision);
+            if (!made) return made.error();
+            // Joints of edges are numbered as they are met, and coarser levels meet no others.
+            if (k == level) skin = *made;
+            if (k < level && made->influences == 6) renumber(*made, skin);
+            if (Status added = add_level(k, *made); !added) return added.error();
+        }
+        if (skin.joints.size() > 65536)
+            return Error{ErrorCode::unsuitable,
+                         "The driver would need " + std::to_string(skin.joints.size()) +
+                             " joints, and glTF counts to 65536; use a model with a smaller driver."};
+        const Result<SkinAnimation> animation =
+            SkinAnimation::sample(skin, poses_, poses, *restorer, options_, context_);
+        if (!animation) return animation.error();
+        add_joints(skin, *animation);
+        const std::vector<double> keys = animation->key_times();
+
+        report_.vertices = skin.positions.size();
+        report_.joints = skin.joints.size();
+        report_.keys = keys.size();
+        report_.seconds = keys.back();
+        report_.normal_error_degrees = animation->normal_error_degrees();
+        if (Status measured = measure(keys, poses, *restorer); !measured) return measured.error();
+        builder_.json["asset"] = {{"extras", {{"filigree", report_json()}}}};
+        if (options_.compress)
+            if (Status packed = builder_.compress(); !packed) return packed.error();
+        if (Status written = builder_.write(path, context_); !written) return written.error();
+        report_.bytes = builder_.byte_count();
+        return report_;
+    }
+
+private:
+    const Model& model_;
+    const FrameSource<Pose>& poses_;
+    const SkinOptions& options_;
+    const RunContext& context_;
+    GlbBuilder builder_;
+    Json meshes_ = Json::array(), nodes_ = Json::array(), roots_ = Json::array();
+    GlbLevels levels_;
+    std::vector<std::size_t> level_nodes_;
+    std::vector<std::string> lost_; ///< what glTF cannot hold
+    ExportReport report_;
+
+    Status check() const {
+        if (poses_.frames == 0)
+            return Error{ErrorCode::unsuitable,
+                         "There are no poses to export; give the model some, by a simulation or from another "
+                         "program."};
+        if (options_.influences != 3 && options_.influences != 6)
+            return Error{ErrorCode::usage,
+                         "A vertex of a skin has 3 or 6 influences, not " + std::to_string(options_.influences) + "."};
+        if (options_.key_rate && !(*options_.key_rate > 0 && *options_.key_rate <= 1e6))
+            return Error{ErrorCode::usage, "The key rate has to be above 0 and at most 1000000, in keys a second."};
+        if (Result<unsigned> level = restored_level(model_, options_.restore); !level) return level.error();
+        return Success{};
+    }
+
+    static void renumber(Skin& skin, const Skin& finest) {
+        std::map<Skin::Joint, Index> number;
+        for (Index j = 0; j < finest.joints.size(); ++j) number[finest.joints[j]] = j;
+        for (Index& joint : skin.vertex_joints) joint = number.at(skin.joints[joint]);
+        skin.joints = finest.joints;
+    }
+
+    /// A node for each object of the level; the finest level's first names the coarser levels.
+    Status add_level(unsigned level, const Skin& skin) {
+        Mesh mesh = levels_.mesh(level);
+        make_skinned(mesh, skin, options_.normals, context_);
+        const Result<GlbParts> cut = make_glb_parts(mesh, {.objects = !options_.all_levels}, context_);
+        if (!cut) return cut.error();
+        const GlbParts& parts = *cut;
+        if (level_nodes_.empty()) lost_ = losses_of_played(parts.lost);
+        const GlbMaterials& materials = levels_.add_materials(builder_, parts);
+        Json attributes = add_glb_attributes(builder_, parts, mesh);
+        attributes["POSITION"] = builder_.add_positions(parts.spread(std::span<const Vec3f>(skin.positions)));
+        add_influences(builder_, parts, skin, options_.full_precision, attributes);
+        const Json repeats = add_glb_repeats(builder_, parts);
+        for (const GlbObject& object : parts.objects) {
+            Json entry = add_glb_mesh(builder_, parts, object, materials, attributes);
+            if (!repeats.is_null()) entry["extras"] = repeats;
+            const std::string name = object.name.empty() ? "level " + std::to_string(level) : object.name;
+            if (level_nodes_.empty()) roots_.push_back(nodes_.size());
+            nodes_.push_back({{"name", name}, {"mesh", meshes_.size()}, {"skin", 0}});
+            meshes_.push_back(std::move(entry));
+        }
+        level_nodes_.push_back(nodes_.size() - 1);
+        return Success{};
+    }
+    void add_joints(const Skin& skin, const SkinAnimation& animation) {
+        if (level_nodes_.size() > 1) {
+            nodes_[0]["extensions"] = {
+                {"MSFT_lod", {{"ids", std::vector<std::size_t>(level_nodes_.begin() + 1, level_nodes_.end())}}}};
+            nodes_[0]["extras"]["MSFT_screencoverage"] =
+                levels_.screen_coverages(restored_level(model_, options_.restore).value(), level_nodes_.size());
+            builder_.json["extensionsUsed"] = {"MSFT_lod"};
+        }
+        const std::size_t root = nodes_.size();
+        Json driver = {{"name", "driver"}, {"children", Json::array()}};
+        const Vec3d& origin = model_.mesh.origin;
+        if (!origin.isZero(0)) driver["translation"] = {origin[0], origin[1], origin[2]};
+        roots_.push_back(root);
+        nodes_.push_back(std::move(driver));
+
+        const Vec3d rest_scale = resting_rotations(skin.gradient_scale()).outer_scale;
+        const std::size_t first_joint = nodes_.size();
+        Json joints = Json::array();
+        std::vector<Eigen::Matrix4f> inverse_binds;
+        for (std::size_t j = 0; j < skin.joints.size(); ++j) {
+            const std::size_t outer = nodes_.size();
+            nodes_[root]["children"].push_back(outer);
+            nodes_.push_back({{"translation", json_numbers(skin.rest[j])},
+                              {"scale", json_numbers(rest_scale)},
+                              {"children", {outer + 1}}});
+            nodes_.push_back({{"scale", json_numbers(kInnerScale)}});
+            joints.push_back(outer + 1);
+            inverse_binds.push_back(Eigen::Matrix4f::Identity());
+            inverse_binds.back().topRightCorner<3, 1>() = -skin.rest[j].cast<float>();
+        }
+        if (Json moves = animation.add_to(builder_, skin, first_joint, context_); !moves.is_null())
+            builder_.json["animations"] = Json::array({moves});
+        const std::size_t binds = builder_.add({.type = "MAT4", .count = inverse_binds.size()},
+                                               bytes_of(std::span<const Eigen::Matrix4f>(inverse_binds)));
+        builder_.json["skins"] =
+            Json::array({{{"joints", std::move(joints)}, {"inverseBindMatrices", binds}, {"skeleton", root}}});
+        builder_.json["meshes"] = std::move(meshes_);
+        builder_.json["nodes"] = std::move(nodes_);
+        builder_.json["scenes"] = Json::array({{{"nodes", std::move(roots_)}}});
+        builder_.json["scene"] = 0;
+        report_.warnings = levels_.warnings();
+        if (!lost_.empty()) report_.warnings.push_back(cannot_hold("A skinned GLB", lost_));
+    }
+
+    /// Reads the file's own bytes and holds them against our restore.
+    Status measure(std::span<const double> keys, PoseSampler& poses, const Restorer& restorer) {
+        const Result<std::string_view> bytes = builder_.gather(); // without a copy, as they may be gigabytes
+        if (!bytes) return bytes.error();
+        const Result<GltfScene> scene = GltfScene::read_view(*bytes, "the exported GLB", context_);
+        if (!scene) return scene.error();
+        const Vec3d shift = scene->mesh().origin - model_.mesh.origin;
+        const bool moves = !scene->animations().empty();
+        std::vector<Vec3f> rest = scene->mesh().positions;
+        const auto played = [&](double seconds, std::span<Vec3f> out) -> Status {
+            if (!moves) std::copy(rest.begin(), rest.end(), out.begin());
+            if (moves)
+                if (Status s = scene->positions(0, seconds, out, context_); !s) return s;
+            if (!shift.isZero(0))
+                for (Vec3f& p : out) p = (p.cast<double>() + shift).cast<float>();
+            return Success{};
+        };
+        const auto restored = [&](double seconds, std::span<Vec3f> out) -> Status {
+            const Result<Pose> pose = poses.at(seconds);
+            if (!pose) return pose.error();
+            return restorer.positions(*pose, out, context_);
+        };
+        return measure_animation(played, scene->mesh().vertex_count(), restored, restorer.vertex_count(), keys,
+                                 poses_.frames_per_second, report_, context_);
+    }
+
+    Json report_json() const {
+        return {{"export", "skin"},
+                {"influences", options_.influences},
+                {"interpolation", options_.interpolation == KeyInterpolation::cubic ? "cubic" : "linear"},
+                {"vertices", report_.vertices},
+                {"joints", report_.joints},
+                {"keys", report_.keys},
+                {"frames", poses_.frames},
+                {"frames_per_second", poses_.frames_per_second},
+                {"seconds", report_.seconds},
+                {"error_at_keys", report_.error_at_keys},
+                {"rms_at_keys", report_.rms_at_keys},
+                {"error_between_keys", report_.error_between_keys},
+                {"rms_between_keys", report_.rms_between_keys},
+                {"moments", report_.moments},
+                {"moments_checked", report_.moments_checked},
+                {"normal_error_degrees", report_.normal_error_degrees}};
+    }
+};
+
+} // namespace
+
+Result<ExportReport> write_skin_glb(const Model& model, const FrameSource<Pose>& poses, const SkinOptions& options,
+                                    const std::filesystem::path& path, const RunContext& context) {
+    try {
+        return SkinExport(model, poses, options, context).write(path);
+    } catch (const std::bad_alloc&) {
+        return Error{ErrorCode::out_of_memory, path.string() + ": does not fit into memory; export fewer keys."};
+    }
+}
+
+} // namespace filigree
