@@ -1,5 +1,5 @@
-// Wedges and colours of a surface that grows by splits: which ones come with a vertex follows from where it comes from,
-// and on seams from a bit; what values they have is expected from their neighbours' [compare Hoppe 1998].
+// Wedges and colours of a surface that grows by splits. A new vertex inherits its parent's wedges; on a seam one bit
+// says which. Their values are predicted from the neighbours' [compare Hoppe 1998].
 #pragma once
 
 #include "filigree/pack/surface_frame.h"
@@ -231,10 +231,23 @@ private:
         bool closes_hole = false;
     };
 
-    /// At its third corner, what the triangles have that go over and that stay.
+    /// What the triangles beside the new edge have, where they go over and where they stay: at u, and at the third
+    /// corner.
     struct Choice {
-        Index u_moves, u_stays, third_moves, third_stays;
+        Index u_moves, u_stays, third_moves = kNoIndex, third_stays = kNoIndex;
     };
+    /// Finds what they have at the third corner, whose triangle that goes over lies between two of its neighbours. The
+    /// one that stays is the next one on the left side, the one before on the right. False: damaged.
+    bool find_third(Index third, Index from, Index to, bool is_left, Choice& choice) const {
+        choice.third_moves = choice.third_stays = at_vertex_[third];
+        if (!has_several(third)) return true;
+        const WedgeRing& there = ring(third);
+        const std::size_t i = place_of(there, from, to), size = there.size();
+        if (i == size) return false;
+        choice.third_moves = there[i].wedge;
+        choice.third_stays = there[(i + (is_left ? 1 : size - 1)) % size].wedge;
+        return true;
+    }
     bool choose(Index v, bool is_left, const Choice& choice, Side& side) {
         const bool may_move = choice.u_moves != kNoIndex && choice.third_moves != kNoIndex,
                    may_stay = choice.u_stays != kNoIndex && choice.third_stays != kNoIndex;
@@ -247,94 +260,100 @@ private:
         return true;
     }
 
+    /// The wedges of u before it splits, clockwise from the left neighbour on.
+    struct WedgesBefore {
+        Index only;     ///< where u has one
+        WedgeRing ring; ///< where it has several
+        Index operator[](std::size_t k) const { return ring.empty() ? only : ring[k].wedge; }
+        Index last() const { return ring.empty() ? only : ring.back().wedge; }
+        Index behind(std::size_t sector) const { return ring.empty() ? only : ring[sector].wedge; }
+    };
+    /// False: the ring does not have these neighbours.
+    static bool turn_ring(const WedgeRing& old, std::span<const Index> around, WedgeRing& turned) {
+        const std::size_t at = place_of(old, around[0], around[1]);
+        if (at == old.size() || old.size() < around.size()) return false;
+        for (std::size_t k = 0; k < old.size(); ++k) turned.push_back(old[(at + k) % old.size()]);
+        for (std::size_t k = 0; k < around.size(); ++k)
+            if (turned[k].end != around[k]) return false;
+        return true;
+    }
+
+    /// Names the wedges of the new vertex, from `first` on: one for each of `parents`, which u has beside the new edge;
+    /// its other wedges cannot come out of it. False: damaged.
+    bool name_children(const WedgesBefore& before, std::span<const Index> around, std::span<const Index> parents,
+                       Index first, const VertexRings& rings, Side& l, Side& r) {
+        const auto child = [&](Index parent) {
+            const auto found = std::find(parents.begin(), parents.end(), parent);
+            return found == parents.end() ? kNoIndex : first + static_cast<Index>(found - parents.begin());
+        };
+        at_v_.resize(around.size() - 1);
+        for (std::size_t k = 0; k < at_v_.size(); ++k) {
+            at_v_[k] = before[k] == kNoIndex ? kNoIndex : child(before[k]);
+            if (at_v_[k] == kNoIndex && before[k] != kNoIndex) return false;
+        }
+        for (std::size_t k = 0; k < at_v_.size() && before.ring.empty();
+             ++k) // without a ring of its own, only `rings` knows of holes
+            if (rings.closes_hole(around[k]) || rings.closes_hole(around[k + 1])) at_v_[k] = kNoIndex;
+        if (!l.closes_hole) l.at_v = child(l.at_u);
+        if (!r.closes_hole) r.at_v = child(r.at_u);
+        return true;
+    }
+
     bool split(Index u, Index v, std::span<const Index> around, const VertexRings& rings) {
         const std::size_t sector = around.size() - 1;
         const Index left = around[0], right = around[sector];
-        const bool several = has_several(u);
-        WedgeRing turned; // u's ring from `left` on
-        if (several) {
-            const WedgeRing& old = ring(u);
-            const std::size_t at = place_of(old, left, around[1]);
-            if (at == old.size() || old.size() <= sector) return false;
-            for (std::size_t k = 0; k < old.size(); ++k) turned.push_back(old[(at + k) % old.size()]);
-            for (std::size_t k = 0; k <= sector; ++k)
-                if (turned[k].end != around[k]) return false;
-        }
-        const auto at_u = [&](std::size_t k) { return several ? turned[k].wedge : at_vertex_[u]; };
-        const std::size_t last = several ? turned.size() - 1 : 0;
-
+        WedgesBefore before{at_vertex_[u], {}};
+        if (has_several(u) && !turn_ring(ring(u), around, before.ring)) return false;
         Side l, r;
         l.closes_hole = rings.closes_hole(left);
         r.closes_hole = rings.closes_hole(right);
         if (l.closes_hole && r.closes_hole) return false;
         if (!l.closes_hole) {
-            Choice choice{at_u(0), at_u(last), at_vertex_[left], at_vertex_[left]};
-            if (has_several(left)) {
-                const WedgeRing& there = ring(left);
-                const std::size_t i = place_of(there, around[1], u);
-                if (i == there.size()) return false;
-                choice.third_moves = there[i].wedge;
-                choice.third_stays = there[(i + 1) % there.size()].wedge;
-            }
-            if (!choose(v, true, choice, l)) return false;
+            Choice choice{before[0], before.last()};
+            if (!find_third(left, around[1], u, true, choice) || !choose(v, true, choice, l)) return false;
         }
         if (!r.closes_hole) {
-            Choice choice{at_u(sector - 1), at_u(several ? sector : 0), at_vertex_[right], at_vertex_[right]};
-            if (has_several(right)) {
-                const WedgeRing& there = ring(right);
-                const std::size_t i = place_of(there, u, around[sector - 1]);
-                if (i == there.size()) return false;
-                choice.third_moves = there[i].wedge;
-                choice.third_stays = there[(i + there.size() - 1) % there.size()].wedge;
-            }
-            if (!choose(v, false, choice, r)) return false;
+            Choice choice{before[sector - 1], before.behind(sector)};
+            if (!find_third(right, u, around[sector - 1], false, choice) || !choose(v, false, choice, r)) return false;
         }
-
-        // A new wedge for each of u's that the triangles beside the new edge have: others cannot come out of it.
-        const Index parents[2] = {l.closes_hole ? r.at_u : l.at_u, r.at_u};
+        const std::array<Index, 2> both = {l.closes_hole ? r.at_u : l.at_u, r.at_u};
+        const std::span<const Index> parents(both.data(), r.closes_hole || both[0] == both[1] ? 1 : 2);
         const auto first = static_cast<Index>(wedges.size());
-        const std::size_t count = r.closes_hole || parents[0] == parents[1] ? 1 : 2;
-        const auto child = [&](Index parent) {
-            for (Index k = 0; k < count; ++k)
-                if (parents[k] == parent) return first + k;
-            return kNoIndex;
-        };
-        std::vector<Index>& at_v = at_v_; // of each triangle that goes over
-        at_v.resize(sector);
-        for (std::size_t k = 0; k < sector; ++k) {
-            at_v[k] = at_u(k) == kNoIndex ? kNoIndex : child(at_u(k));
-            if (at_v[k] == kNoIndex && at_u(k) != kNoIndex) return false;
-        }
-        if (!several) // whether they close holes is not in a ring
-            for (std::size_t k = 0; k < sector; ++k)
-                if (rings.closes_hole(around[k]) || rings.closes_hole(around[k + 1])) at_v[k] = kNoIndex;
-        if (!l.closes_hole) l.at_v = child(l.at_u);
-        if (!r.closes_hole) r.at_v = child(r.at_u);
-        if (wedges.size() + count >= kSeveral) return false;
-        for (std::size_t k = 0; k < count; ++k)
-            add_child(v, parents[k], samples(u, around, l, r, first + Index(k)), rings);
+        if (!name_children(before, around, parents, first, rings, l, r)) return false;
+        if (wedges.size() + parents.size() >= kSeveral) return false;
+        for (Index k = 0; k < parents.size(); ++k) add_child(v, parents[k], samples(u, around, l, r, first + k), rings);
+        set_own_rings(u, v, around, before, parents.size() == 1 ? first : kNoIndex, l, r);
+        return insert_in_rings(u, v, around, l, r);
+    }
 
-        if (several) {
+    /// The rings of u and of the new vertex v. only: v's wedge where it has one.
+    void set_own_rings(Index u, Index v, std::span<const Index> around, const WedgesBefore& before, Index only,
+                       const Side& l, const Side& r) {
+        const std::size_t sector = around.size() - 1;
+        if (!before.ring.empty()) {
             WedgeRing rest = {{v, r.at_u}};
-            rest.insert(rest.end(), turned.begin() + std::ptrdiff_t(sector), turned.end());
-            rest.push_back({left, l.at_u});
+            rest.insert(rest.end(), before.ring.begin() + std::ptrdiff_t(sector), before.ring.end());
+            rest.push_back({around[0], l.at_u});
             ring(u) = std::move(rest);
         }
-        if (count == 1)
-            at_vertex_[v] = first;
-        else {
-            WedgeRing own = {{u, l.at_v}};
-            for (std::size_t k = 0; k < sector; ++k) own.push_back({around[k], at_v[k]});
-            own.push_back({right, r.at_v});
-            set_ring(v, std::move(own));
-        }
+        at_vertex_[v] = only;
+        if (only != kNoIndex) return;
+        WedgeRing own = {{u, l.at_v}};
+        for (std::size_t k = 0; k < sector; ++k) own.push_back({around[k], at_v_[k]});
+        own.push_back({around[sector], r.at_v});
+        set_ring(v, std::move(own));
+    }
+    /// Puts v into the rings of its neighbours. False: a damaged ring has a neighbour twice.
+    bool insert_in_rings(Index u, Index v, std::span<const Index> around, const Side& l, const Side& r) {
+        const std::size_t sector = around.size() - 1;
+        const Index left = around[0], right = around[sector];
         for (std::size_t k = 1; k < sector; ++k)
             if (has_several(around[k]))
                 for (RingCorner& corner : ring(around[k])) corner.end = corner.end == u ? v : corner.end;
         if (has_several(left)) {
             WedgeRing& there = ring(left);
             const std::size_t i = place_of(there, around[1], u);
-            if (i == there.size()) return false; // a damaged ring has a neighbour twice
+            if (i == there.size()) return false;
             there.insert(there.begin() + std::ptrdiff_t((i + 1) % there.size()), {v, l.at_third});
         }
         if (has_several(right)) {

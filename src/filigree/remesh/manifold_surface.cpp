@@ -5,7 +5,6 @@
 
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
-#include "filigree/core/random.h"
 #include "filigree/mesh.h"
 #include "filigree/mesh/edges.h"
 #include "filigree/mesh/orientation.h"
@@ -63,7 +62,7 @@ std::vector<Index> repeated_polygons(const Mesh& mesh, std::span<const Index> we
     for (Index f = 0; f < mesh.face_count(); ++f) {
         if (mesh.face_size(f) < 4) continue;
         std::uint64_t key = mesh.face_size(f);
-        for (const Index v : mesh.face(f)) key += random_bits(0, welded[v]);
+        for (const Index v : mesh.face(f)) key += (welded[v] + 1) * 0x9E3779B97F4A7C15u ^ (welded[v] + 1) >> 7;
         keys.emplace_back(key, f);
     }
     std::sort(keys.begin(), keys.end());
