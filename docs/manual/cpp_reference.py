@@ -1,5 +1,5 @@
 """The C++ reference: doxygen reads the public headers, and this writes their declarations and comments as pages, one a
-layer. Breathe would do the same in five times the time, and shows every template parameter before the sentence."""
+header. Breathe would do the same in five times the time, and shows every template parameter before the sentence."""
 
 import re
 import subprocess
@@ -7,7 +7,9 @@ import tempfile
 import xml.etree.ElementTree as tree
 from pathlib import Path
 
-LAYERS = ["core", "mesh", "hierarchy", "deform", "coding", "sample", "fracture", "physics", "melting", "remesh", "io", "scene", "render", "present"]
+# In the order in which they build on each other.
+HEADERS = ["types", "result", "context", "mesh", "strip", "pose", "restore", "pack", "file", "sample", "remesh", "reference",
+           "physics/material", "physics/body", "physics/world", "physics/simulation", "fracture", "scene", "render"]
 DOXYFILE = """
 INPUT = {inputs}
 GENERATE_HTML = NO
@@ -26,13 +28,12 @@ STRIP_FROM_PATH = {src}
 
 
 def public_headers(root):
-    """Headers that are installed: those that src/filigree/CMakeLists.txt does not name as internal."""
-    cmake = (root / "src/filigree/CMakeLists.txt").read_text()
-    words = re.search(r'string\(JOIN "\|" internal_headers(.*?)\)\n(?! )', cmake, re.DOTALL).group(1).split()
-    internal = re.compile("(" + "|".join(words) + r")\.h$")
-    src = root / "src/filigree"
-    headers = [h for layer in LAYERS for h in sorted((src / layer).glob("*.h"))]
-    return [h for h in headers if not internal.fullmatch(str(h.relative_to(src)))]
+    """The headers in include/filigree but for the one that includes the others."""
+    folder = root / "include/filigree"
+    there = {str(h.relative_to(folder).with_suffix("")) for h in folder.rglob("*.h")} - {"filigree"}
+    if there != set(HEADERS):
+        raise SystemExit(f"cpp_reference: HEADERS and include/filigree differ: {', '.join(sorted(there ^ set(HEADERS)))}")
+    return [folder / f"{name}.h" for name in HEADERS]
 
 
 def write(root, folder):
@@ -41,32 +42,29 @@ def write(root, folder):
     headers = public_headers(root)
     with tempfile.TemporaryDirectory() as work:
         doxyfile = Path(work) / "Doxyfile"
-        doxyfile.write_text(DOXYFILE.format(inputs=" ".join(map(str, headers)), out=work, src=root / "src"))
+        doxyfile.write_text(DOXYFILE.format(inputs=" ".join(map(str, headers)), out=work, src=root / "include"))
         subprocess.run(["doxygen", doxyfile], check=True, stdout=subprocess.DEVNULL)
         xml = Path(work) / "xml"
         files = {}
         for entry in tree.parse(xml / "index.xml").getroot().findall("compound[@kind='file']"):
             compound = tree.parse(xml / f"{entry.get('refid')}.xml").getroot().find("compounddef")
-            files[compound.find("location").get("file").split("src/")[-1]] = compound
+            files[compound.find("location").get("file").split("include/")[-1]] = compound
         members = {}  # of the namespace, by header
         space = tree.parse(xml / "namespacefiligree.xml").getroot().find("compounddef")
         for member in space.findall("sectiondef/memberdef"):
-            members.setdefault(member.find("location").get("file").split("src/")[-1], []).append(member)
-        for layer in LAYERS:
-            lines = [layer, "=" * len(layer), ""]
-            for header in headers:
-                name = str(header.relative_to(root / "src"))
-                if header.parent.name == layer:
-                    lines += _header(name, header, files[name], members.get(name, []), xml)
-            (out / f"{layer}.rst").write_text("\n".join(lines) + "\n")
-    index = ["C++", "===", "", "A page a layer; each layer uses those above it. Everything is in the namespace ``filigree``.", "",
-             ".. toctree::", "   :maxdepth: 2", ""]
-    (out / "index.rst").write_text("\n".join(index + [f"   {layer}" for layer in LAYERS]) + "\n")
+            members.setdefault(member.find("location").get("file").split("include/")[-1], []).append(member)
+        for header in headers:
+            name = str(header.relative_to(root / "include"))
+            page = _header(name, header, files[name], members.get(name, []), xml)
+            (out / f"{header.stem}.rst").write_text("\n".join(page) + "\n")
+    index = ["C++", "===", "", "A page a header; ``filigree/filigree.h`` includes those of the core. Everything is in the namespace ``filigree``.", "",
+             ".. toctree::", "   :maxdepth: 1", ""]
+    (out / "index.rst").write_text("\n".join(index + [f"   {header.stem}" for header in headers]) + "\n")
 
 
 def _header(name, path, compound, members, xml):
     title = f"``{name}``"
-    lines = [title, "-" * len(title), "", *_opening(path), ""]
+    lines = [title, "=" * len(title), "", *_opening(path), ""]
     for inner in compound.findall("innerclass"):
         if "@" not in inner.text:
             declared = tree.parse(xml / f"{inner.get('refid')}.xml").getroot().find("compounddef")

@@ -27,9 +27,10 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 LAYERS = {  # and the tests that judge them, quick ones first
-    "hierarchy": ["properties_test", "same_bytes", "hierarchy_test"],
+    "blend": ["properties_test", "same_bytes", "blend_test"],
+    "levels": ["properties_test", "same_bytes", "levels_test"],
     "sample": ["properties_test", "same_bytes", "sample_test"],
-    "coding": ["properties_test", "same_bytes", "coding_test"],
+    "pack": ["properties_test", "same_bytes", "pack_test"],
     "fracture": ["same_bytes", "fracture_test"],
 }
 CHANGES = [
@@ -180,7 +181,7 @@ def main():
     def unchanged(number, test):
         folder = options.work / f"unchanged-{number}"
         folder.mkdir(parents=True, exist_ok=True)
-        path = by_layer["hierarchy"][0][0]
+        path = by_layer["blend"][0][0]
         assert library.make(folder, path, path.read_text())
         begin = time.monotonic()
         if by := fails(options.release, test, folder, 1200):
