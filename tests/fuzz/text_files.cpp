@@ -4,7 +4,7 @@
 
 #include "filigree/io/animation/handles_file.h"
 #include "filigree/io/mesh/material_file.h"
-#include "filigree/scene/scene_file.h"
+#include "filigree/scene.h"
 
 using namespace filigree_fuzz;
 

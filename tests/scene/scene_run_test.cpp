@@ -29,6 +29,22 @@ protected:
     }
 };
 
+TEST_F(SceneRunTest, ASceneInOneCallMovesAsARunFrameByFrame) {
+    const SceneFile dropped = scene(filigree_test::kDrop);
+    const SceneMotion motion = simulate_scene(dropped, kOneThread).value();
+    const auto run = made();
+    ASSERT_TRUE(run->run->advance_to(dropped.frames, kOneThread));
+    ASSERT_EQ(motion.bodies.size(), run->ready.bodies.size());
+    const PoseSequence& moved = motion.bodies[0].poses;
+    ASSERT_EQ(moved.frames.size(), dropped.frames + 1); // with the start
+    EXPECT_EQ(moved.frames.back().positions, run->run->recording().poses[0].frames.back().positions);
+    EXPECT_EQ(motion.bodies[0].name, run->ready.bodies[0].name);
+    EXPECT_FALSE(motion.broke_down);
+    RunContext cancelled;
+    cancelled.cancel();
+    EXPECT_EQ(simulate_scene(dropped, cancelled).error().code, ErrorCode::cancelled);
+}
+
 TEST_F(SceneRunTest, EqualRunsSaveEqualBytes) {
     EXPECT_EQ(state_after(*made(), 4), state_after(*made(), 4));
     EXPECT_EQ(state_after(*made(filigree_test::kDrop, true), 4), state_after(*made(filigree_test::kDrop, true), 4));

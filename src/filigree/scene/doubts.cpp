@@ -1,6 +1,6 @@
 #include "filigree/scene/doubts.h"
 
-#include "filigree/scene/scene_file.h"
+#include "filigree/scene.h"
 
 #include <algorithm>
 #include <cmath>

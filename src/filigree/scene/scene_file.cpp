@@ -1,4 +1,4 @@
-#include "filigree/scene/scene_file.h"
+#include "filigree/scene.h"
 
 #include "filigree/core/random.h"
 #include "filigree/file.h"
@@ -6,6 +6,7 @@
 #include "filigree/io/system/file.h"
 #include "filigree/physics/material.h"
 #include "filigree/scene/scene_table.h"
+#include "filigree/scene/world_setup.h"
 
 #include <algorithm>
 #include <cmath>
@@ -427,10 +428,6 @@ Result<SceneFile> read_scene(const std::string& path, std::span<const SceneValue
     } catch (const BadResultAccess& failure) {
         return failure.error();
     }
-}
-
-Error scene_error(const SceneFile& scene, unsigned line, ErrorCode code, const std::string& what) {
-    return error_at(scene.path, line, code, what);
 }
 
 } // namespace filigree

@@ -2,7 +2,7 @@
 // these rows, and so do the tables of docs/scenes.md, `sweep`, the Python module and the studio.
 #pragma once
 
-#include "filigree/scene/scene_file.h"
+#include "filigree/scene.h"
 
 #include <string_view>
 #include <variant>

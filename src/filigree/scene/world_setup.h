@@ -1,11 +1,14 @@
 // From a scene's words to bodies, a world and what is drawn of it.
 #pragma once
 
+#include "filigree/scene.h"
 #include "filigree/scene/body_driver.h"
 #include "filigree/scene/breaking.h"
-#include "filigree/scene/scene_file.h"
 
 namespace filigree {
+
+/// An error in a line of the scene: "scene.toml:12: what".
+Error scene_error(const SceneFile& scene, unsigned line, ErrorCode code, const std::string& what);
 
 struct ReadyBody {
     std::string name;
