@@ -1,6 +1,7 @@
 #include "filigree/remesh/feature_curves.h"
 
 #include "filigree/core/disjoint_sets.h"
+#include "filigree/core/view.h"
 #include "filigree/mesh/edges.h"
 #include "filigree/remesh/manifold_surface.h"
 
@@ -12,16 +13,16 @@ namespace filigree {
 
 namespace {
 
-constexpr double kCornerTurn = 45 * std::numbers::pi / 180; // between chords of kCornerReach
-constexpr int kMostSteps = 512;                             // along a curve, however densely its vertices lie
-constexpr double kCornerReach = 0.25;                       // patch sides, to either side of a vertex
+constexpr double kCornerTurn = radians(45); // between chords of kCornerReach
+constexpr int kMostSteps = 512;             // along a curve, however densely its vertices lie
+constexpr double kCornerReach = 0.25;       // patch sides, to either side of a vertex
 // Noise makes short curves that are hardly sharp. In patch sides, for chains with a free end and for closed ones: what
 // is too short in any case, and from where on a curve need not be clearly sharp.
 constexpr double kShortestChain = 1, kLongChain = 3;
 constexpr double kShortestLoop = 0.5, kLongLoop = 3;
 constexpr int kPruningRounds = 4;
-constexpr double kSmallNetwork = 1.5;                         // patch sides, of all its edges together
-constexpr double kClearlySharp = 20 * std::numbers::pi / 180; // beyond the asked angle, on average along the curve
+constexpr double kSmallNetwork = 1.5;         // patch sides, of all its edges together
+constexpr double kClearlySharp = radians(20); // beyond the asked angle, on average along the curve
 
 struct Curves {
     const ManifoldSurface& surface;
@@ -104,7 +105,7 @@ std::vector<Chain> chains_of(const Curves& curves) {
 /// kPruningRounds times. Borders never go.
 void prune(const ManifoldSurface& surface, std::span<const Index> twins, const FeatureOptions& options,
            std::vector<float>& marked) {
-    const double clear = options.angle_deg * std::numbers::pi / 180 + kClearlySharp;
+    const double clear = radians(options.angle_deg) + kClearlySharp;
     const auto is_noise = [&](const Chain& chain, double shortest, double longest) {
         const double length = chain.length / options.patch_side;
         return length < shortest || (length < longest && chain.angle < clear);
@@ -215,7 +216,7 @@ FeatureCurves find_feature_curves(const ManifoldSurface& surface, std::span<cons
         const Vec3d& a = surface.positions[t[0]];
         normals.push_back((surface.positions[t[1]] - a).cross(surface.positions[t[2]] - a).normalized());
     }
-    const double least = options.angle_deg * std::numbers::pi / 180;
+    const double least = radians(options.angle_deg);
     std::vector<float> angles(twins.size(), 0);
     if (options.angle_deg < 180)
         for (Index h = 0; h < twins.size(); ++h) {
