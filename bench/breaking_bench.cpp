@@ -1,6 +1,6 @@
 // What a body that breaks costs as a whole: frames a second of a mesh that is thrown on the ground and goes to pieces
 // which touch each other. FILIGREE_SCAN names the mesh; a wavy sphere unless said.
-#include "filigree/fracture/fracture_pattern.h"
+#include "filigree/fracture.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/physics/simulation.h"
@@ -43,7 +43,7 @@ Simulation thrown(Index pieces, const RunContext& context) {
         Partition partition{cells->pieces(),
                             [cells, scale](const Vec3d& point) { return cells->piece_at(point / scale); }};
         auto fracture = std::make_shared<Fracture>();
-        fracture->body = std::make_shared<const BrokenBody>(break_body(body, std::move(partition), context).value());
+        fracture->body = break_body(body, std::move(partition), context).value();
         fracture->material = {.strength = 1e4, .scatter = 0.2, .energy = 3};
         actor.fracture = fracture;
     }

@@ -2,6 +2,7 @@
 #include "heap.h"
 
 #include "filigree/io/mesh_file.h"
+#include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/simulation.h"
 
 #include <benchmark/benchmark.h>

@@ -1,7 +1,6 @@
 // What breaking a mesh costs, and how good what comes out is. FILIGREE_SCAN names the mesh; a wavy sphere unless said.
 // One thread. Times are of the cut: the surface, and what lies inside; reading, welding and naming pieces are apart.
-#include "filigree/fracture/fracture.h"
-#include "filigree/fracture/fracture_pattern.h"
+#include "filigree/fracture.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/triangulate.h"

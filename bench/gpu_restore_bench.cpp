@@ -4,7 +4,7 @@
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/render/gl_context.h"
+#include "filigree/render.h"
 #include "filigree/render/gl_objects.h"
 #include "filigree/render/gpu_restore.h"
 

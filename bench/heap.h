@@ -1,6 +1,7 @@
 // 200 rigid pieces that fall into a tray, heap up and come to rest.
 #pragma once
 
+#include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/simulation.h"
 
 #include <vector>

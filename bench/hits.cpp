@@ -5,7 +5,7 @@
 // the smallest volume ratio of a cell. Ends with 1 if energy grew by more than 1 % in any.
 #include "filigree/core/now_seconds.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/material.h"
 #include "filigree/physics/simulation.h"
 
 #include <algorithm>

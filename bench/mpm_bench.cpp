@@ -1,6 +1,7 @@
 // What a step of the material point method costs: particles a second, by their number and by threads; beside other
 // work look at processor time.
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/body/make_cells.h"
+#include "filigree/physics/material.h"
 #include "filigree/physics/simulation.h"
 
 #include <benchmark/benchmark.h>

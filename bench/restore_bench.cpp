@@ -107,8 +107,8 @@ void BM_restore_blend(benchmark::State& state) {
     std::vector<BlendRestorer::Item> items(model.mesh.vertex_count());
     for (Index v = 0; v < items.size(); ++v) items[v] = {v, v};
     const std::vector<Vec3f> normals(with_normals ? items.size() : 0, Vec3f::UnitZ());
-    const BlendRestorer restorer(std::get<BlendDetail>(model.detail), model.mesh.positions, model.driver().vertices,
-                                 items, normals, RunContext());
+    const BlendRestorer restorer(model.detail, model.mesh.positions, model.driver().vertices, items, normals,
+                                 RunContext());
     const std::vector<Vec3f> driver = driver_positions(model);
     const std::vector<Mat3f> gradients(driver.size(), Mat3f::Identity());
     std::vector<Vec3f> positions(items.size()), restored_normals(normals.size());

@@ -8,7 +8,7 @@
 // inverted at the end of a frame, with 2 if a mesh could not be read.
 #include "filigree/core/now_seconds.h"
 #include "filigree/io/mesh_file.h"
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/material.h"
 #include "filigree/physics/simulation.h"
 
 #include <algorithm>

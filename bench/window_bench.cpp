@@ -7,8 +7,7 @@
 #include "filigree/mesh/ray_hit.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/triangulate.h"
-#include "filigree/render/gl_context.h"
-#include "filigree/render/renderer.h"
+#include "filigree/render.h"
 
 #include <benchmark/benchmark.h>
 #include <cstdio>

@@ -25,7 +25,8 @@ if(FILIGREE_NODE AND bundler)
   if(FILIGREE_WASM_CLANG AND wasm_standard)
     set(decoder_sources ${web}/decoder/decoder.cpp)
     foreach(name coding/clip_code coding/closed_map coding/connectivity_code coding/driver_code coding/face_code
-                 coding/geometry_code coding/level_reader coding/symbols coding/vertex_rings mesh/triangle_point)
+                 coding/geometry_code coding/level_reader coding/symbols coding/vertex_rings mesh/edges
+                 mesh/triangle_point)
       list(APPEND decoder_sources ${PROJECT_SOURCE_DIR}/src/filigree/${name}.cpp)
     endforeach()
     # As one source: the headers are read once.

@@ -1,8 +1,7 @@
 // Any mesh as quads with subdivision levels: remeshed, stripped with the report's code, restored.
-#include <filigree/hierarchy/restore.h>
-#include <filigree/hierarchy/strip.h>
 #include <filigree/mesh/shapes.h>
 #include <filigree/mesh/triangulate.h>
+#include <filigree/reference/reference_model.h>
 #include <filigree/remesh/quad_remesh.h>
 
 #include <algorithm>
@@ -24,10 +23,10 @@ int main() {
                 std::max(report.to_input.max, report.from_input.max));
 
     // The levels are found again from the mesh alone.
-    const Model model = strip(quads.mesh, {.code = DetailCode::reference}, context).value().model;
+    const ReferenceModel model = strip_to_reference(quads.mesh, {}, context).value();
     std::printf("%u levels below the finest\n", model.finest_level());
-    const Restorer restorer = Restorer::create(model, {.law = HeightLaw::inverse}, context).value();
-    const std::vector<Vec3f> restored = restorer.positions(rest_pose(model), context).value();
+    const std::vector<Vec3f> restored =
+        restore_reference(model, driver_positions(model), {}, context).value().positions;
     float error = 0;
     for (std::size_t v = 0; v < restored.size(); ++v)
         error = std::max(error, (restored[v] - quads.mesh.positions[v]).norm());

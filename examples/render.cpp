@@ -1,8 +1,7 @@
 // Draws a mesh into a PNG file, without a window.
+#include "filigree/render.h"
 #include "filigree/io/file.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/render/gl_context.h"
-#include "filigree/render/renderer.h"
 
 #include <iostream>
 

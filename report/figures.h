@@ -4,8 +4,7 @@
 #include "filigree/core/run_context.h"
 #include "filigree/mesh/mesh.h"
 #include "filigree/present/page.h"
-#include "filigree/render/camera.h"
-#include "filigree/render/renderer.h"
+#include "filigree/render.h"
 
 #include <memory>
 #include <optional>

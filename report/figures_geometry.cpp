@@ -2,7 +2,7 @@
 #include "figures.h"
 #include "figures_layout.h"
 
-#include "filigree/hierarchy/height_law.h"
+#include "filigree/reference/height_law.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,8 +2,8 @@
 #include "figures.h"
 #include "figures_layout.h"
 
-#include "filigree/hierarchy/reference_code.h"
 #include "filigree/mesh/shapes.h"
+#include "filigree/reference/reference_code.h"
 
 #include <algorithm>
 #include <cmath>

@@ -8,8 +8,11 @@
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/render/gl_context.h"
-#include "filigree/sample/spacing_for_count.h"
+#include "filigree/reference/reference_model.h"
+#include "filigree/render.h"
+#include "filigree/sample.h"
+#include "filigree/sample/closure.h"
+#include "filigree/sample/inside_rays.h"
 
 #include "interactive/fidelity.h"
 
@@ -250,7 +253,7 @@ Figure draw_border_rays(FigureRenderer& renderer) {
 Figure draw_removed_detail(FigureRenderer& renderer) {
     constexpr double kPanelHeight = 310;
     const Mesh cube = make_wavy_cube({.resolution = 64});
-    const Model model = stripped_model(cube, {.code = DetailCode::reference, .levels = 3}, renderer.context());
+    const ReferenceModel model = strip_to_reference(cube, {.max_levels = 3}, renderer.context()).value();
     const Mesh meshes[] = {level_mesh(model, 2), level_mesh(model, 0)};
     Page page = captioned_page(
         content_height(1, kPanelHeight), "Figure 2.9",
@@ -273,14 +276,12 @@ Figure draw_deformation_process(FigureRenderer& renderer) {
     constexpr double kPanelHeight = 220, kStretch = 2.5;
     const RunContext& context = renderer.context();
     const Mesh cube = make_wavy_cube({.resolution = 64});
-    const Model model = stripped_model(cube, {.code = DetailCode::reference, .levels = 5}, context);
+    const ReferenceModel model = strip_to_reference(cube, {.max_levels = 5}, context).value();
     const auto warp = make_stretch(world_bounds(cube), Axis::x, kStretch).value();
-    const Pose pose{warp_positions(*warp, driver_positions(model), model.mesh.origin, context), {}, {}};
-    const Restorer restorer = Restorer::create(model, {.law = HeightLaw::inverse}, context).value();
     const Mesh low = level_mesh(model, 0);
     Mesh stretched = low;
-    stretched.positions = pose.positions;
-    const Mesh returned = restorer.mesh(pose, context).value();
+    stretched.positions = warp_positions(*warp, low.positions, model.mesh.origin, context);
+    const Mesh returned = restore_reference(model, stretched.positions, {}, context).value();
 
     const double before = mean_height(cube, cube, 2, 0.5), after = mean_height(cube, returned, 2, 0.5),
                  ends = mean_height(cube, returned, 0, 0.5 * kStretch);
@@ -317,18 +318,15 @@ Figure draw_extreme_deformation(FigureRenderer& renderer) {
     constexpr double kPanelHeight = 220;
     const RunContext& context = renderer.context();
     const Mesh face = make_wavy_plane({.resolution = 64});
-    const Model model = stripped_model(face, {.code = DetailCode::reference}, context);
+    const ReferenceModel model = strip_to_reference(face, {}, context).value();
     const Mesh corners = level_mesh(model, 0);
-    Pose pose{corners.positions, {}, {}};
-    for (Vec3f& p : pose.positions) { // by hand: one corner up and out, its opposite down, the others pulled apart
+    Mesh moved = corners;
+    for (Vec3f& p : moved.positions) { // by hand: one corner up and out, its opposite down, the others pulled apart
         const bool right = p.x() > 0, back = p.y() > 0;
         p = right ? (back ? Vec3f(0.80f, 0.55f, 0.45f) : Vec3f(0.45f, -0.75f, -0.20f))
                   : (back ? Vec3f(-0.50f, 0.90f, -0.05f) : Vec3f(-0.70f, -0.35f, 0.25f));
     }
-    Mesh moved = corners;
-    moved.positions = pose.positions;
-    const Restorer restorer = Restorer::create(model, {}, context).value();
-    const Mesh returned = restorer.mesh(pose, context).value();
+    const Mesh returned = restore_reference(model, moved.positions, {}, context).value();
 
     Page page = captioned_page(
         content_height(2, kPanelHeight), "Figure 3.1",
@@ -365,15 +363,14 @@ Figure draw_fidelity(FigureRenderer& renderer) {
     Mesh full = cube;
     full.positions = warp_positions(*warp, cube.positions, cube.origin, context);
 
-    const Model reference = stripped_model(cube, {.code = DetailCode::reference, .levels = 2}, context);
+    const ReferenceModel reference = strip_to_reference(cube, {.max_levels = 2}, context).value();
     const std::size_t driver_count = reference.driver().vertices.size();
     const Model blend = stripped_model(cube, {.base = driver_count}, context);
-    const Pose reference_pose = warp_pose(*warp, driver_positions(reference), cube.origin, context);
+    const std::vector<Vec3f> reference_pose = warp_positions(*warp, driver_positions(reference), cube.origin, context);
     const Pose blend_pose = warp_pose(*warp, driver_positions(blend), cube.origin, context);
-    const Restorer reference_restorer = Restorer::create(reference, {}, context).value();
     const Restorer blend_restorer = Restorer::create(blend, {}, context).value();
     const std::pair<const char*, std::vector<Vec3f>> methods[] = {
-        {"reference code", reference_restorer.positions(reference_pose, context).value()},
+        {"reference code", restore_reference(reference, reference_pose, {}, context).value().positions},
         {"wrap deformer", bench::wrap_positions(blend, blend_pose, context)},
         {"blend code", blend_restorer.positions(blend_pose, context).value()}};
 

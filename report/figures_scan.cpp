@@ -9,6 +9,7 @@
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/present/patch_drawing.h"
+#include "filigree/reference/reference_model.h"
 #include "filigree/remesh/quad_remesh.h"
 
 #include <cmath>
@@ -44,19 +45,28 @@ struct Returned {
     double rms; ///< from where a warp of every vertex puts them, fraction of the diagonal
 };
 
-Returned put_back(const Model& model, const RestoreOptions& law, const SpaceWarp& warp, const RunContext& context) {
-    Returned result;
-    const Pose pose = warp_pose(warp, driver_positions(model), model.mesh.origin, context);
-    const Restorer restorer = Restorer::create(model, law, context).value();
-    result.driver = level_mesh(model, 0);
-    result.driver.positions = pose.positions;
-    result.mesh = model.mesh;
-    result.mesh.positions = restorer.positions(pose, context).value();
-    Mesh direct = model.mesh;
-    direct.positions = warp_positions(warp, model.mesh.positions, model.mesh.origin, context);
+/// Beside the rest mesh with every vertex warped.
+Returned compared(Returned result, const Mesh& rest, const SpaceWarp& warp, const RunContext& context) {
+    Mesh direct = rest;
+    direct.positions = warp_positions(warp, rest.positions, rest.origin, context);
     const MeshDistance distance = mesh_distance(result.mesh, direct, 0, context).value();
     result.rms = distance.relative(distance.vertices->rms);
     return result;
+}
+
+Returned put_back(const Model& model, const SpaceWarp& warp, const RunContext& context) {
+    Returned result{level_mesh(model, 0), model.mesh, 0};
+    const Pose pose = warp_pose(warp, model, context);
+    result.driver.positions = pose.positions;
+    result.mesh.positions = Restorer::create(model, {}, context).value().positions(pose, context).value();
+    return compared(std::move(result), model.mesh, warp, context);
+}
+
+Returned put_back(const ReferenceModel& model, const SpaceWarp& warp, const RunContext& context) {
+    Returned result{level_mesh(model, 0), model.mesh, 0};
+    result.driver.positions = warp_positions(warp, result.driver.positions, model.mesh.origin, context);
+    result.mesh.positions = restore_reference(model, result.driver.positions, {}, context).value().positions;
+    return compared(std::move(result), model.mesh, warp, context);
 }
 
 std::unique_ptr<SpaceWarp> extreme_warp(const Box& box) {
@@ -88,16 +98,14 @@ Figure draw_remeshed_scan(FigureRenderer& renderer) {
                     context)
             .value();
     const unsigned levels = remeshed.patches.levels;
-    const Model reference =
-        strip(remeshed.mesh, {.code = DetailCode::reference, .levels = levels}, context).value().model;
+    const ReferenceModel reference = strip_to_reference(remeshed.mesh, {.max_levels = levels}, context).value();
     const std::size_t driver_count = reference.driver().vertices.size();
     const Model blend = strip(remeshed.mesh, {.base = driver_count}, context).value().model;
 
     const Box box = world_bounds(remeshed.mesh);
     const auto stretch = make_stretch(box, Axis::z, kStretch).value(), extreme = extreme_warp(box);
-    const Returned stretched = put_back(reference, {.law = HeightLaw::inverse}, *stretch, context);
-    const Returned twisted = put_back(reference, {}, *extreme, context),
-                   blended = put_back(blend, {}, *extreme, context);
+    const Returned stretched = put_back(reference, *stretch, context);
+    const Returned twisted = put_back(reference, *extreme, context), blended = put_back(blend, *extreme, context);
     const Mesh once = level_mesh(reference, levels - 1), coarsest = level_mesh(reference, 0);
 
     const QuadRemeshReport& report = remeshed.report;

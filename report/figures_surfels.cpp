@@ -9,7 +9,7 @@
 #include "filigree/melting/particle_field.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/surfels.h"
-#include "filigree/sample/spacing_for_count.h"
+#include "filigree/sample.h"
 
 #include <algorithm>
 #include <cmath>
@@ -96,9 +96,7 @@ Figure draw_surfels(FigureRenderer& renderer) {
     const Restorer restorer = Restorer::create(model, {}, context).value();
     const std::vector<Vec3f> restored = restorer.positions(pose, context).value();
     const Surfels carried =
-        split_surfels(
-            carried_surfels(rest, restored, vertex_gradients(std::get<BlendDetail>(model.detail), pose.gradients)))
-            .value();
+        split_surfels(carried_surfels(rest, restored, vertex_gradients(model.detail, pose.gradients))).value();
 
     const double drawn_error = rms(drawn.positions, truth), carried_error = rms(restored, full.positions);
     Page page = captioned_page(

@@ -85,25 +85,26 @@ void report_export(const ExportReport& exported, bool is_skin, bool has_normals,
 }
 
 /// A model's poses as the restored level moves.
-MeshAnimation restored_animation(const Restorer& restorer, const PoseStream& poses, const Mesh& rest,
+MeshAnimation restored_animation(const Restorer& restorer, const FrameSource<Pose>& poses, const Mesh& rest,
                                  const RunContext& silent) {
     return {&rest, poses.frames, poses.frames_per_second,
             [&restorer, &poses, &silent](std::size_t frame, std::span<Vec3f> positions) -> Status {
-                const Result<Pose> pose = poses.pose(frame);
+                const Result<Pose> pose = poses.frame(frame);
                 if (!pose) return pose.error();
                 return restorer.positions(*pose, positions, silent);
             },
             poses.metres_per_unit};
 }
 
-void write_numbered(const Restorer& restorer, const PoseStream& poses, const std::string& path,
+void write_numbered(const Restorer& restorer, const FrameSource<Pose>& poses, const std::string& path,
                     const std::string& input, const RunContext& silent, Session& session) {
     const auto mesh = [&](std::size_t frame) -> Result<Mesh> {
-        const Result<Pose> pose = poses.pose(frame);
+        const Result<Pose> pose = poses.frame(frame);
         if (!pose) return pose.error();
         return restorer.mesh(*pose, silent);
     };
-    session.warn(require(write_numbered_meshes(poses.frames, mesh, numbered_path(path, input), session.context())));
+    session.warn(require(write_numbered_meshes({poses.frames, poses.frames_per_second, mesh},
+                                               numbered_path(path, input), session.context())));
 }
 
 } // namespace
@@ -182,26 +183,27 @@ OptionList pose_file_options(PoseFileOptions& options) {
             pose_up_option(options)};
 }
 
-PoseStream poses_of(const std::string& poses, const PoseFileOptions& options, const Model& model,
-                    const PoseSequence& own, const std::string& model_path, Session& session) {
+FrameSource<Pose> poses_of(const std::string& poses, const PoseFileOptions& options, const Model& model,
+                           const PoseSequence& own, const std::string& model_path, Session& session) {
     if (!poses.empty()) {
         const std::vector<Vec3f> rest = driver_positions(model);
         std::vector<std::string> warnings;
         PoseFileOptions matched = options;
         matched.rest = rest;
         matched.warnings = &warnings;
-        PoseStream stream = require(open_poses(poses, rest.size(), model.mesh.origin, matched, session.context()));
+        FrameSource<Pose> stream =
+            require(open_poses(poses, rest.size(), model.mesh.origin, matched, session.context()));
         session.warn(warnings);
         return stream;
     }
     if (!options.animation.empty()) refuse("--animation belongs to --poses.");
     own_pose(own, 1, model_path);
-    PoseStream stream = stream_of(own);
+    FrameSource<Pose> stream = frames_of(own);
     stream.frames_per_second = options.frames_per_second.value_or(own.frames_per_second);
     return stream;
 }
 
-ChunkReport write_chunk_output(const Model& model, const PoseStream& poses, const RestoreOptions& restore,
+ChunkReport write_chunk_output(const Model& model, const FrameSource<Pose>& poses, const RestoreOptions& restore,
                                const WorkChunk& chunk, const std::string& path, Session& session) {
     const Restorer restorer = require(Restorer::create(model, restore, session.context()));
     const Mesh rest = level_mesh(model, require(restored_level(model, restore)));
@@ -210,7 +212,7 @@ ChunkReport write_chunk_output(const Model& model, const PoseStream& poses, cons
                                          chunk, session.context()));
 }
 
-void write_chunks_output(const ModelChunks& model, const PoseStream& poses, const RestoreOptions& restore,
+void write_chunks_output(const ModelChunks& model, const FrameSource<Pose>& poses, const RestoreOptions& restore,
                          const std::string& path, Session& session, Report& report) {
     session.begin_writing(path);
     session.warn(require(write_restored_chunks(model, poses, restore, path, session.context())));
@@ -218,12 +220,11 @@ void write_chunks_output(const ModelChunks& model, const PoseStream& poses, cons
     report_frames(poses.frames, poses.frames_per_second, model.vertex_count(), report);
 }
 
-void write_animation_output(const Model& model, const PoseStream& poses, const RestoreOptions& restore,
+void write_animation_output(const Model& model, const FrameSource<Pose>& poses, const RestoreOptions& restore,
                             const AnimationOutput& output, const std::string& path, const std::string& materials_beside,
                             Session& session, Report& report) {
     const AnimationFormat format = require(animation_format(path));
-    const bool makes_skin =
-        output.glb == GlbMotion::skin || (output.glb == GlbMotion::automatic && model.code() == DetailCode::blend);
+    const bool makes_skin = output.glb != GlbMotion::morph;
     if (format == AnimationFormat::glb && makes_skin) {
         SkinOptions options = output.skin;
         if (output.no_normals) options.normals = ExportNormals::leave;

@@ -46,20 +46,20 @@ Option pose_up_option(PoseFileOptions& options);
 OptionList pose_file_options(PoseFileOptions& options);
 
 /// The poses of a file, one frame in memory where it allows that, or the model's own, which `own` keeps.
-PoseStream poses_of(const std::string& poses, const PoseFileOptions& options, const Model& model,
-                    const PoseSequence& own, const std::string& model_path, Session& session);
+FrameSource<Pose> poses_of(const std::string& poses, const PoseFileOptions& options, const Model& model,
+                           const PoseSequence& own, const std::string& model_path, Session& session);
 
 /// Restores one chunk of the frames into `path`, a .pc2 that other processes write too.
-ChunkReport write_chunk_output(const Model& model, const PoseStream& poses, const RestoreOptions& restore,
+ChunkReport write_chunk_output(const Model& model, const FrameSource<Pose>& poses, const RestoreOptions& restore,
                                const WorkChunk& chunk, const std::string& path, Session& session);
 
 /// Restores the poses into `path`, a .pc2, while the model stays in its file. Reports as write_animation_output.
-void write_chunks_output(const ModelChunks& model, const PoseStream& poses, const RestoreOptions& restore,
+void write_chunks_output(const ModelChunks& model, const FrameSource<Pose>& poses, const RestoreOptions& restore,
                          const std::string& path, Session& session, Report& report);
 
 /// Writes a model's poses to `path`: .glb as a skin (or morph targets), everything else restored frame by frame, one in
 /// memory at a time. Reports what was written. materials_beside: the model's or mesh's own path.
-void write_animation_output(const Model& model, const PoseStream& poses, const RestoreOptions& restore,
+void write_animation_output(const Model& model, const FrameSource<Pose>& poses, const RestoreOptions& restore,
                             const AnimationOutput& output, const std::string& path, const std::string& materials_beside,
                             Session& session, Report& report);
 

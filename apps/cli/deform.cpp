@@ -1,6 +1,7 @@
 #include "animation_output.h"
 #include "commands.h"
 #include "pictures.h"
+#include "reference.h"
 #include "restore_options.h"
 
 #include "filigree/deform/warp_steps.h"
@@ -18,7 +19,8 @@ struct DeformArguments {
     std::optional<Axis> axis = {};
     std::uint64_t seed = 1;
     RestoreOptions restore;
-    std::size_t frames = 0; ///< of an animation; 0: the full deformation alone
+    std::optional<HeightLaw> law; ///< reference code
+    std::size_t frames = 0;       ///< of an animation; 0: the full deformation alone
     double frames_per_second = 60;
     AnimationOutput animation;
 
@@ -40,6 +42,10 @@ public:
     Pose driver(const Model& model, double fraction, const RunContext& context) const {
         if (!handles_.empty()) return moved(pose_by_handles(model, handles_at(fraction), context));
         return warp_pose(*warp_at(fraction, world_bounds(model.mesh)), model, context);
+    }
+    std::vector<Vec3f> driver(const ReferenceModel& model, double fraction, const RunContext& context) const {
+        return warp_positions(*warp_at(fraction, world_bounds(model.mesh)), driver_positions(model), model.mesh.origin,
+                              context);
     }
 
 private:
@@ -96,13 +102,13 @@ void check_poses_fit(std::size_t frames, std::size_t driver_vertices, const std:
 }
 
 /// The model itself, with the poses.
-void write_posed_model(const Model& model, const PoseStream& poses, const std::string& output, Session& session,
+void write_posed_model(const Model& model, const FrameSource<Pose>& poses, const std::string& output, Session& session,
                        Report& report) {
     check_poses_fit(poses.frames, model.driver().vertices.size(), output);
     PoseSequence sequence{poses.frames_per_second, {}};
     for (std::size_t frame = 0; frame < poses.frames; ++frame) {
         session.context().report("deforming", double(frame) / double(poses.frames));
-        sequence.frames.push_back(require(poses.pose(frame)));
+        sequence.frames.push_back(require(poses.frame(frame)));
     }
     session.context().report("deforming", 1);
     session.write_model(model, output, sequence);
@@ -113,9 +119,9 @@ void write_posed_model(const Model& model, const PoseStream& poses, const std::s
 void animate_model(const Model& model, const DeformArguments& options, Session& session, Report& report) {
     const Deformation deformation(options);
     const RunContext silent = session.silent_context(); // the bar tells of frames
-    const PoseStream poses{options.frames, options.frames_per_second, [&](std::size_t frame) -> Result<Pose> {
-                               return deformation.driver(model, options.fraction(frame), silent);
-                           }};
+    const FrameSource<Pose> poses{options.frames, options.frames_per_second, [&](std::size_t frame) -> Result<Pose> {
+                                      return deformation.driver(model, options.fraction(frame), silent);
+                                  }};
     if (is_model_path(options.output)) return write_posed_model(model, poses, options.output, session, report);
     write_animation_output(model, poses, options.restore, options.animation, options.output, options.input, session,
                            report);
@@ -136,6 +142,14 @@ void animate_mesh(const Mesh& rest, const DeformArguments& options, Session& ses
     write_animation_output(animation, options.animation, options.output, options.input, session, report);
 }
 
+void report_frames_made(const DeformArguments& options, bool through_driver, double start, Report& report) {
+    report.set("output", options.output);
+    report.set("frames", options.frames);
+    report.set("frames_per_second", options.frames_per_second);
+    report.set("through_driver", through_driver);
+    report.set("seconds", now_seconds() - start);
+}
+
 void deform_animation(const DeformArguments& options, const Session::Content& content, Session& session) {
     Report report;
     const double start = now_seconds();
@@ -144,11 +158,7 @@ void deform_animation(const DeformArguments& options, const Session::Content& co
         animate_model(*model, options, session, report);
     else
         animate_mesh(std::get<Mesh>(content.value), options, session, report);
-    report.set("output", options.output);
-    report.set("frames", options.frames);
-    report.set("frames_per_second", options.frames_per_second);
-    report.set("through_driver", model != nullptr);
-    report.set("seconds", now_seconds() - start);
+    report_frames_made(options, model != nullptr, start, report);
     session.print(report);
 }
 
@@ -175,8 +185,50 @@ void deform_model(const Model& model, const DeformArguments& options, Session& s
     if (!options.pose_output.empty()) session.write_mesh(posed_driver(model, pose), options.pose_output);
     Report report;
     report_deformed(mesh, true, seconds, options, report);
-    if (model.code() == DetailCode::blend)
-        note_expected_error(require(PoseError(model, context).estimate(pose, gradients)), model, pose, report, session);
+    note_expected_error(require(PoseError(model, context).estimate(pose, gradients)), model, pose, report, session);
+    session.print(report);
+}
+
+void animate_reference_code(const ReferenceModel& model, const DeformArguments& options, Session& session) {
+    if (is_model_path(options.output) || options.restore.level)
+        refuse(ErrorCode::unsuitable,
+               options.input + ": has the reference code, of which frames are whole meshes; give -o another animation "
+                               "than .fil, and no --level.");
+    const Deformation deformation(options);
+    const RunContext silent = session.silent_context();
+    const double start = now_seconds();
+    const ReferenceRestorer restorer(model.detail, options.law.value_or(HeightLaw::inverse), session.context());
+    const MeshAnimation animation{&model.mesh, options.frames, options.frames_per_second,
+                                  [&](std::size_t frame, std::span<Vec3f> positions) -> Status {
+                                      restorer.restore(deformation.driver(model, options.fraction(frame), silent),
+                                                       model.finest_level(), positions, silent);
+                                      return Success{};
+                                  }};
+    Report report;
+    write_animation_output(animation, options.animation, options.output, options.input, session, report);
+    report_frames_made(options, true, start, report);
+    session.print(report);
+}
+
+void deform_reference_code(const ReferenceModel& model, const DeformArguments& options, Session& session) {
+    if (!options.handles.empty())
+        refuse(ErrorCode::unsuitable, options.input + ": has the reference code, which takes no --handles.");
+    if (options.frames > 0) return animate_reference_code(model, options, session);
+    const RunContext& context = session.context();
+    const double start = now_seconds();
+    const std::vector<Vec3f> driver = Deformation(options).driver(model, 1, context);
+    const Mesh mesh = require(restore_reference(
+        model, driver, {.law = options.law.value_or(HeightLaw::inverse), .level = options.restore.level}, context));
+    const double seconds = now_seconds() - start;
+    session.write_mesh(mesh, options.output, options.input);
+    if (!options.pose_output.empty()) {
+        Mesh moved = driver_mesh(level_mesh(model, 0));
+        moved.positions = driver;
+        moved.normals = {}; // those at rest
+        session.write_mesh(moved, options.pose_output);
+    }
+    Report report;
+    report_deformed(mesh, true, seconds, options, report);
     session.print(report);
 }
 
@@ -239,14 +291,19 @@ Command deform_command() {
                     Option("--frames", options->frames, "This many frames from the rest shape to the full deformation")
                         .whole_from(2),
                     Option("--frame-rate", options->frames_per_second, "Frames a second").above_zero().with_default()} +
-                restore_options(options->restore) + animation_options(options->animation),
+                restore_options(options->restore) + OptionList{law_option(options->law)} +
+                animation_options(options->animation),
             .examples = "  filigree deform scan.fil -o bent.ply --bend 90 --twist 45\n"
                         "  filigree deform scan.ply -o full.ply --bend 90 --twist 45\n"
                         "  filigree deform scan.fil -o pulled.ply --handles pull.json\n"
                         "  filigree deform scan.fil -o bent.glb --bend 90 --frames 60",
             .run = [options](Session& session) {
                 check(*options, session);
-                const Session::Content content = session.read_any(options->input);
+                const FileReader file = session.open(options->input);
+                if (is_reference_model(file, options->input, session))
+                    return deform_reference_code(read_reference(file, options->input, session), *options, session);
+                refuse_law(options->input, session);
+                const Session::Content content = session.read_any(file, options->input);
                 if (options->frames > 0)
                     deform_animation(*options, content, session);
                 else if (const auto* model = std::get_if<Model>(&content.value))

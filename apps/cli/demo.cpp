@@ -28,7 +28,7 @@ struct DemoWarp {
     double twist_deg, bend_deg;
 
     /// What stands leans over, and its base stays on the ground; what lies is bent along its longest side.
-    DemoWarp(const Box& of, UpAxis up) : box(of), axis(static_cast<Axis>(up)) {
+    DemoWarp(const Box& of, UpAxis up) : box(of), axis(up) {
         constexpr double kLying = 1.5; // longest side over height
         if (box.size().maxCoeff() > kLying * box.size()[int(axis)]) axis = longest_axis(box);
         const int a = int(axis);
@@ -37,7 +37,7 @@ struct DemoWarp {
         const double slimness = length / std::max(half_width, 1e-9 * length);
         twist_deg = std::min(90.0, 45 * slimness);
         bend_deg = std::min(75.0, 25 * slimness); // the inner side keeps half of the radius or more
-        if (axis != static_cast<Axis>(up)) return;
+        if (axis != up) return;
         box.min[a] -= length; // the middle of a box twice as high does not move, and that is the base
         twist_deg *= 2;
         bend_deg *= 2;
@@ -111,7 +111,7 @@ void run_demo(const DemoArguments& options, Session& session) {
         bench::median_seconds([&] { require(restorer.positions(pose, positions, context)); });
     const Mesh restored = require(restorer.mesh(pose, context));
     const MeshDistance with_gradients = require(mesh_distance(restored, full, 0, context));
-    const Mesh from_positions = require(restorer.mesh({pose.positions, {}, {}}, context));
+    const Mesh from_positions = require(restorer.mesh({pose.positions, {}}, context));
     const MeshDistance positions_only = require(mesh_distance(from_positions, full, 0, context));
 
     session.write_model(model, model_file);

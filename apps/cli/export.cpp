@@ -74,7 +74,7 @@ void export_model(const Model& model, const PoseSequence& own, const ExportArgum
                   Report& report) {
     const bool moves = !options.at_rest && (!options.poses.empty() || !own.empty());
     if (!moves) return export_levels(model, options, session, report);
-    const PoseStream poses = poses_of(options.poses, options.pose_file, model, own, options.input, session);
+    const FrameSource<Pose> poses = poses_of(options.poses, options.pose_file, model, own, options.input, session);
     if (!options.web) check_animation_options({options.output}, session);
     write_animation_output(model, poses, options.restore, options.animation, options.output, options.input, session,
                            report);
@@ -101,9 +101,9 @@ void export_stream(const Model& model, const PoseSequence& own, const ExportArgu
     if (!given.empty()) refuse(given + " belongs to pages that play a GLB; leave out --stream.");
     PoseSequence poses;
     if (!options.at_rest && (!options.poses.empty() || !own.empty())) {
-        const PoseStream from = poses_of(options.poses, options.pose_file, model, own, options.input, session);
+        const FrameSource<Pose> from = poses_of(options.poses, options.pose_file, model, own, options.input, session);
         poses.frames_per_second = from.frames_per_second;
-        for (std::size_t frame = 0; frame < from.frames; ++frame) poses.frames.push_back(require(from.pose(frame)));
+        for (std::size_t frame = 0; frame < from.frames; ++frame) poses.frames.push_back(require(from.frame(frame)));
     }
     std::optional<Model> embedding; // where materials lie beside the model, one that has them inside
     if (!model.mesh.materials.empty()) {
@@ -162,7 +162,6 @@ void export_page(const Model& model, const PoseSequence& own, ExportArguments op
     WebPage page(folder, fs::path(options.input).stem().string(), options.stream ? WebModel::stream : WebModel::glb);
     options.output = page.model_path();
     options.animation.skin.all_levels = true;
-    if (model.code() == DetailCode::reference) options.animation.glb = GlbMotion::morph;
     if (options.stream)
         export_stream(model, own, options, session, report);
     else

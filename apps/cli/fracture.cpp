@@ -2,8 +2,7 @@
 #include "output_folder.h"
 #include "session.h"
 
-#include "filigree/fracture/fracture.h"
-#include "filigree/fracture/fracture_pattern.h"
+#include "filigree/fracture.h"
 
 #include <fmt/format.h>
 

@@ -6,7 +6,7 @@
 #include "filigree/io/gltf.h"
 #include "filigree/mesh/topology.h"
 #include "filigree/remesh/quad_quality.h"
-#include "filigree/sample/closure.h"
+#include "filigree/sample.h"
 
 #include <cmath>
 
@@ -183,7 +183,7 @@ void describe_code(const ModelOutline& model, Report& report) {
         report.add("coded", "lossless", "coding", {{"profile", "lossless"}});
         add_coding_shares(*model.lossless, model.levels.back().vertices, model.bytes, report);
     }
-    if (model.code == DetailCode::reference) {
+    if (model.references > 0) {
         report.add("references", std::to_string(model.references), "references", model.references);
         return report.count("patches", "patches", model.patches);
     }
@@ -201,16 +201,12 @@ constexpr std::size_t kQuickDriver = 20'000;  ///< vertices, of a driver that is
 constexpr std::size_t kQuickMesh = 2'000'000; ///< vertices, of a mesh read and judged in a second or so
 
 bool is_judged_quickly(const ModelOutline& model) {
-    return model.levels.back().vertices <= kQuickMesh &&
-           (model.code == DetailCode::reference || model.levels.front().vertices <= kQuickDriver);
+    return model.levels.back().vertices <= kQuickMesh && model.levels.front().vertices <= kQuickDriver;
 }
 
 /// What the driver is good for.
 void describe_fidelity(const Model& model, Session& session, Report& report) {
     const DriverFidelity fidelity = require(driver_fidelity(model, session.context()));
-    if (model.code() == DetailCode::reference)
-        return report.add("fidelity", fmt::format("{:.2g} of the diagonal", fidelity.positions), "fidelity",
-                          {{"positions", fidelity.positions}});
     report.add("fidelity",
                fmt::format("{:.2g} of the diagonal from positions, {:.2g} with gradients", fidelity.positions,
                            fidelity.gradients),
@@ -218,7 +214,7 @@ void describe_fidelity(const Model& model, Session& session, Report& report) {
 }
 
 void describe_model(const ModelOutline& model, Report& report) {
-    const char* code = model.code == DetailCode::blend ? "blend" : "reference";
+    const char* code = model.references > 0 ? "reference" : "blend";
     report.add("code", code, "code", code);
     describe_levels(model, report);
     describe_code(model, report);
@@ -291,6 +287,7 @@ void run(const InfoArguments& options, Session& session) {
         const ModelOutline model = session.outline(file, path);
         report.set("kind", "model");
         describe_model(model, report);
+        if (model.references > 0) return session.print(report);
         if (options.fidelity || is_judged_quickly(model))
             describe_fidelity(session.read_model(file, path), session, report);
         else

@@ -5,7 +5,7 @@
 
 #include "filigree/io/extension.h"
 #include "filigree/present/headless_renderer.h"
-#include "filigree/render/film.h"
+#include "filigree/render.h"
 #include "filigree/render/surface_materials.h"
 
 namespace filigree::cli {

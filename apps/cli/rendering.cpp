@@ -21,8 +21,6 @@ Background parse_background(const std::string& text) {
 
 /// The file's own surfels, or some made of its surface.
 void Rendering::choose_surfels(Subject& subject, const std::string& path) {
-    if (subject.model && subject.model->code() != DetailCode::blend)
-        refuse(ErrorCode::unsuitable, path + ": has the reference code, which knows no gradients to carry surfels by.");
     subject.surfels = surfels_of_points(subject.mesh);
     if (!subject.surfels) subject.surfels = require(make_surfels(subject.mesh, context()));
     if (subject.surfels->size() == 0)
@@ -147,8 +145,8 @@ void Rendering::set_pose(Subject& subject, const Pose& pose, bool on_screen) {
     if (!subject.restorer) subject.restorer = require(Restorer::create(*subject.model, options_.restore, context()));
     require(subject.restorer->positions(pose, subject.mesh.positions, context()));
     if (subject.surfels) {
-        const auto& detail = std::get<BlendDetail>(subject.model->detail);
-        subject.gradients = vertex_gradients(detail, require(subject.restorer->gradients(pose, context())));
+        subject.gradients =
+            vertex_gradients(subject.model->detail, require(subject.restorer->gradients(pose, context())));
     }
     if (!on_screen) return;
     if (subject.surfels) {

@@ -2,6 +2,7 @@
 #include "chunks.h"
 #include "commands.h"
 #include "pictures.h"
+#include "reference.h"
 #include "restore_options.h"
 
 #include "filigree/hierarchy/vertex_order.h"
@@ -17,13 +18,7 @@
 namespace filigree::cli {
 
 OptionList restore_options(RestoreOptions& options) {
-    std::vector<std::pair<std::string, HeightLaw>> laws;
-    for (std::string_view name : kHeightLawNames) laws.emplace_back(name, *height_law_from_name(name));
-    return {choice("--law", options.law, laws,
-                   "How high detail is when its surroundings grow (unset: proportional, or inverse for a reference "
-                   "model)"),
-            Option("--level", options.level, "Restore up to this level (unset: the finest)"),
-            Option("--thin-shell", options.thin_shell, "Bumps keep their shape, as on cloth and skin")};
+    return {Option("--level", options.level, "Restore up to this level (unset: the finest)")};
 }
 
 namespace {
@@ -31,13 +26,12 @@ namespace {
 /// What makes a pose that is too curved come out better.
 std::string advice_for(const Model& model, const Pose& pose) {
     constexpr double kMany = 0.02; // of the vertices in loose parts: then these are what is off
-    const auto* detail = std::get_if<BlendDetail>(&model.detail);
-    const std::size_t loose = detail ? detail->across_gap.size() : 0;
+    const std::size_t loose = model.detail.across_gap.size();
     if (!pose.gradients.empty() || double(loose) < kMany * double(model.vertex_count()))
         return "Strip with a finer driver (--base, or --fidelity).";
     return fmt::format("{} vertices are of parts that the driver has no vertex of, and positions alone do not say how "
-                       "such parts turn: give the pose with gradients or ghost points (--ghosts), or strip with a "
-                       "driver so fine that it has vertices of them (--base, or --fidelity).",
+                       "such parts turn: give the pose with gradients, or strip with a driver "
+                       "so fine that it has vertices of them (--base, or --fidelity).",
                        with_commas(loose));
 }
 
@@ -65,12 +59,13 @@ const Pose& own_pose(const PoseSequence& poses, std::size_t frame, const std::st
 namespace {
 
 struct RestoreArguments {
-    std::string model, pose, poses, ghosts, output, picture, chunk;
+    std::string model, pose, poses, output, picture, chunk;
     std::optional<UpAxis> up;
     std::size_t frame = 0; ///< of the model's own, from 1; 0: none
     bool all_frames = false, as_surfels = false, in_input_order = false;
     PoseFileOptions poses_file;
     RestoreOptions restore;
+    std::optional<HeightLaw> law; ///< reference code
     AnimationOutput animation;
 
     bool is_animation() const { return all_frames || !poses.empty(); }
@@ -86,7 +81,6 @@ void check(const RestoreArguments& options, const Session& session) {
     if (!options.pose.empty() + !options.poses.empty() + (options.frame > 0) + options.all_frames != 1)
         refuse("Say what moved the driver: --pose FILE for a mesh, --poses FILE for an animation, or for a model that "
                "holds poses --frame N or --frames.");
-    if (options.pose.empty() && !options.ghosts.empty()) refuse("--ghosts belongs to --pose.");
     if (options.poses.empty() && !options.poses_file.animation.empty()) refuse("--animation belongs to --poses.");
     if (!options.is_animation() && options.poses_file.frames_per_second)
         refuse("--frame-rate belongs to --poses or --frames.");
@@ -116,11 +110,7 @@ void check(const RestoreArguments& options, const Session& session) {
     check_not_input(place, {options.model, options.poses});
 }
 
-const char* source_of(const Model& model, const Pose& pose) {
-    if (model.code() == DetailCode::reference) return "positions";
-    if (!pose.gradients.empty()) return "positions and gradients";
-    return pose.ghosts.empty() ? "positions" : "positions and ghost points";
-}
+const char* source_of(const Pose& pose) { return pose.gradients.empty() ? "positions" : "positions and gradients"; }
 
 /// The restored mesh, coloured by where it is expected to be off.
 void draw_expected_error(const Model& model, const PoseError::Estimate& estimate, const Mesh& mesh,
@@ -145,14 +135,10 @@ void report_expected_error(const Model& model, const Pose& pose, const PoseError
 /// The mesh's surfels, made at rest and carried to where it is now.
 Mesh surfels_of(const Model& model, const Mesh& restored, std::span<const Mat3f> gradients,
                 const RestoreArguments& options, Session& session) {
-    const auto* detail = std::get_if<BlendDetail>(&model.detail);
-    if (!detail)
-        refuse(ErrorCode::unsuitable,
-               options.model + ": has the reference code, which knows no gradients to carry surfels by.");
     const Surfels rest = require(make_surfels(model.mesh, session.context()));
     if (rest.size() == 0) refuse(ErrorCode::unsuitable, options.model + ": has no faces to make surfels of.");
     return surfel_points(
-        require(split_surfels(carried_surfels(rest, restored.positions, vertex_gradients(*detail, gradients)))));
+        require(split_surfels(carried_surfels(rest, restored.positions, vertex_gradients(model.detail, gradients)))));
 }
 
 /// The driver as another program moved it. Vertices that it split for normals or UVs are made one again.
@@ -164,7 +150,7 @@ Pose moved_pose(const Model& model, const std::string& path, const RestoreArgume
         if (const std::optional<VertexMatch> match = match_by_faces(driver, moved)) {
             std::vector<Vec3f> positions(driver.vertex_count());
             require(match->apply(pose.positions, positions, path));
-            pose = {std::move(positions), {}, {}};
+            pose = {std::move(positions), {}};
             session.warn(fmt::format("{}: its {} vertices were split for their normals or UVs; those at one place are "
                                      "one again, which makes the driver's {}.",
                                      path, with_commas(moved.vertex_count()), with_commas(driver.vertex_count())));
@@ -177,16 +163,11 @@ Pose moved_pose(const Model& model, const std::string& path, const RestoreArgume
     return pose;
 }
 
-void restore_one(const RestoreArguments& options, Session& session) {
+void restore_one(const FileReader& file, const RestoreArguments& options, Session& session) {
     PoseSequence own;
-    const Model model = session.read_model(options.model, options.frame ? &own : nullptr);
-    Pose pose =
+    const Model model = session.read_model(file, options.model, options.frame ? &own : nullptr);
+    const Pose pose =
         options.frame ? own_pose(own, options.frame, options.model) : moved_pose(model, options.pose, options, session);
-    if (!options.ghosts.empty())
-        pose.ghosts = pose_of_mesh(session.read_mesh(options.ghosts), model.mesh.origin).positions;
-    if (!options.picture.empty() && model.code() != DetailCode::blend)
-        refuse(ErrorCode::unsuitable, options.model + ": has the reference code, whose error can only be measured: "
-                                                      "'filigree compare' does, with --picture.");
     const Restorer restorer = require(Restorer::create(model, options.restore, session.context()));
     const double start = now_seconds();
     const std::vector<Mat3f> gradients =
@@ -201,7 +182,7 @@ void restore_one(const RestoreArguments& options, Session& session) {
                            options.output, options.model);
     else
         session.write_mesh(mesh, options.output, options.model);
-    const char* from = source_of(model, pose);
+    const char* from = source_of(pose);
     Report report;
     report.say(fmt::format("{}: {} vertices restored from {} in {}\n", options.output, with_commas(mesh.vertex_count()),
                            from, seconds_text(seconds)));
@@ -209,10 +190,37 @@ void restore_one(const RestoreArguments& options, Session& session) {
     report.set("vertices", mesh.vertex_count());
     report.set("from", from);
     report.set("seconds", seconds);
-    if (model.code() == DetailCode::blend) {
-        const PoseError judge(model, session.context());
-        report_expected_error(model, pose, require(judge.estimate(pose, gradients)), mesh, options, session, report);
-    }
+    const PoseError judge(model, session.context());
+    report_expected_error(model, pose, require(judge.estimate(pose, gradients)), mesh, options, session, report);
+    session.print(report);
+}
+
+/// A mesh from one pose, by the report's method.
+void restore_reference_code(const FileReader& file, const RestoreArguments& options, Session& session) {
+    const std::string given = session.first_given(
+        {"--poses", "--frame", "--frames", "--surfels", "--input-order", "--picture", "--chunk", "--pose-up"});
+    if (!given.empty())
+        refuse(ErrorCode::unsuitable, options.model +
+                                          ": has the reference code, which takes --pose, --law and --level, "
+                                          "and no " +
+                                          given + ".");
+    const ReferenceModel model = read_reference(file, options.model, session);
+    const Pose pose = pose_of_mesh(session.read_mesh(options.pose), model.mesh.origin);
+    const double start = now_seconds();
+    const Mesh mesh = require(
+        with_hint(restore_reference(model, pose.positions,
+                                    {.law = options.law.value_or(HeightLaw::inverse), .level = options.restore.level},
+                                    session.context()),
+                  ErrorCode::mismatch, "'filigree level MODEL 0' writes the driver as it is."));
+    const double seconds = now_seconds() - start;
+    session.write_mesh(mesh, options.output, options.model);
+    Report report;
+    report.say(fmt::format("{}: {} vertices restored from positions in {}\n", options.output,
+                           with_commas(mesh.vertex_count()), seconds_text(seconds)));
+    report.set("output", options.output);
+    report.set("vertices", mesh.vertex_count());
+    report.set("from", "positions");
+    report.set("seconds", seconds);
     session.print(report);
 }
 
@@ -223,11 +231,9 @@ std::string job_of(const RestoreArguments& options) {
         for (const std::filesystem::path& path : animation_files(options.poses)) inputs.push_back(path);
     const RestoreOptions& restore = options.restore;
     const PoseFileOptions& file = options.poses_file;
-    return fmt::format("{} level {} law {} thin-shell {} rate {} animation {} up {}", require(hash_of_files(inputs)),
-                       restore.level ? std::to_string(*restore.level) : "finest",
-                       restore.law ? std::to_string(int(*restore.law)) : "own", restore.thin_shell,
-                       file.frames_per_second.value_or(0), file.animation,
-                       file.up ? std::to_string(int(*file.up)) : "own");
+    return fmt::format("{} level {} rate {} animation {} up {}", require(hash_of_files(inputs)),
+                       restore.level ? std::to_string(*restore.level) : "finest", file.frames_per_second.value_or(0),
+                       file.animation, file.up ? std::to_string(int(*file.up)) : "own");
 }
 
 /// The model where it can stay in its file: restored to its finest level, into a .pc2, from a file that can be read
@@ -246,26 +252,26 @@ struct AnimatedModel {
     PoseSequence own;
     std::optional<ModelChunks> in_file;
     std::optional<Model> in_memory;
-    PoseStream poses;
+    FrameSource<Pose> poses;
 
     const Model& driver() const { return in_file ? in_file->driver() : *in_memory; } ///< has the driver, or more
 };
 
 /// It is where it is made: its stream refers to it.
-void read_animated(const RestoreArguments& options, Session& session, AnimatedModel& model) {
+void read_animated(const FileReader& file, const RestoreArguments& options, Session& session, AnimatedModel& model) {
     model.in_file = chunks_in_file(options, session);
     if (!model.in_file)
-        model.in_memory = session.read_model(options.model, options.all_frames ? &model.own : nullptr);
+        model.in_memory = session.read_model(file, options.model, options.all_frames ? &model.own : nullptr);
     else if (options.all_frames)
-        model.own = require(read_poses(session.open_model(options.model), options.model, session.context()));
+        model.own = require(read_poses(file, options.model, session.context()));
     model.poses = poses_of(options.poses, options.poses_file, model.driver(), model.own, options.model, session);
 }
 
-void restore_chunk(const RestoreArguments& options, Session& session) {
+void restore_chunk(const FileReader& file, const RestoreArguments& options, Session& session) {
     WorkChunk chunk = chunk_of(options.chunk);
     chunk.job = job_of(options);
     AnimatedModel model;
-    read_animated(options, session, model);
+    read_animated(file, options, session, model);
     const double start = now_seconds();
     session.begin_writing(options.output);
     const ChunkReport written =
@@ -294,11 +300,11 @@ void restore_chunk(const RestoreArguments& options, Session& session) {
     session.print(report);
 }
 
-void restore_all(const RestoreArguments& options, Session& session) {
-    if (!options.chunk.empty()) return restore_chunk(options, session);
+void restore_all(const FileReader& file, const RestoreArguments& options, Session& session) {
+    if (!options.chunk.empty()) return restore_chunk(file, options, session);
     AnimatedModel model;
-    read_animated(options, session, model);
-    const char* from = source_of(model.driver(), require(model.poses.pose(0)));
+    read_animated(file, options, session, model);
+    const char* from = source_of(require(model.poses.frame(0)));
     Report report;
     const double start = now_seconds();
     if (model.in_file)
@@ -326,7 +332,6 @@ Command restore_command() {
                            "The moved driver: level 0 with the same vertex order; a PLY with vertex properties f00 .. "
                            "f22 gives gradients too")
                         .is_read(),
-                    Option("--ghosts", options->ghosts, "The moved ghost points (see level --ghosts)").is_read(),
                     Option("--frame", options->frame, "Or one of the poses that the model holds, from 1").whole_from(1),
                     Option("--frames", options->all_frames, "Or all of them, as an animation"),
                     Option("--poses", options->poses,
@@ -347,9 +352,9 @@ Command restore_command() {
                                   "Also draw the mesh coloured by the error to expect (.png, .svg, .pdf)")
                                .is_written(),
                            found_up_option(options->up)} +
-                restore_options(options->restore) + animation_options(options->animation),
+                restore_options(options->restore) + OptionList{law_option(options->law)} +
+                animation_options(options->animation),
             .examples = "  filigree restore scan.fil --pose moved.obj -o restored.ply\n"
-                        "  filigree restore scan.fil --pose moved.obj -o skin.ply --thin-shell --law keep\n"
                         "  filigree restore scan.fil --pose moved.obj -o restored.ply --picture errors.png\n"
                         "  filigree restore bounce.fil --frame 30 -o half_a_second.ply\n"
                         "  filigree restore bounce.fil --frames -o frames/\n"
@@ -357,7 +362,11 @@ Command restore_command() {
                         "  filigree restore scan.fil --poses cloth.pc2 -o shot.pc2 --chunk 3/40",
             .run = [options](Session& session) {
                 check(*options, session);
-                options->is_animation() ? restore_all(*options, session) : restore_one(*options, session);
+                const FileReader file = session.open_model(options->model);
+                if (is_reference_model(file, options->model, session))
+                    return restore_reference_code(file, *options, session);
+                refuse_law(options->model, session);
+                options->is_animation() ? restore_all(file, *options, session) : restore_one(file, *options, session);
             }};
 }
 

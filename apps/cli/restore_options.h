@@ -10,7 +10,7 @@
 
 namespace filigree::cli {
 
-/// --law, --level and --thin-shell.
+/// --level.
 OptionList restore_options(RestoreOptions& options);
 
 /// Into the JSON, with a warning where the driver is too coarse for the pose, as the pose alone shows.

@@ -2,10 +2,8 @@
 #include "pictures.h"
 #include "session.h"
 
+#include "filigree/sample.h"
 #include "filigree/sample/frustum.h"
-#include "filigree/sample/inside_test.h"
-#include "filigree/sample/spacing_for_count.h"
-#include "filigree/sample/spread_inside.h"
 
 #include <algorithm>
 

@@ -266,12 +266,12 @@ private:
         };
         std::vector<std::string> warnings;
         session_.begin_writing(path);
-        const std::size_t frames = recording.poses[0].frames.size();
+        const FrameSource<MeshMoment> moments{recording.poses[0].frames.size(), rate, moment};
         if (is_glb)
-            require(write_glb_moments(frames, rate, options_.animation.skin.key_rate.value_or(kMoltenKeys), moment,
-                                      path, session_.context()));
+            require(write_glb_moments(moments, options_.animation.skin.key_rate.value_or(kMoltenKeys), path,
+                                      session_.context()));
         else
-            require(write_usda_moments(frames, rate, moment, path, warnings, session_.context()));
+            require(write_usda_moments(moments, path, warnings, session_.context()));
         session_.warn(warnings);
         Report report;
         report.set("output", path);
@@ -286,7 +286,7 @@ private:
             for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
                 if (melting.has_body(b)) continue;
                 Report report;
-                PoseStream poses = stream_of(run_->recording().poses[b]);
+                FrameSource<Pose> poses = frames_of(run_->recording().poses[b]);
                 poses.metres_per_unit = 1; // the world of scenes
                 write_animation_output(ready_.bodies[b].model, poses, {}, options_.animation,
                                        model_path(path, ready_.bodies.size(), ready_.bodies[b].name),
@@ -322,20 +322,23 @@ private:
         const RunContext silent = session_.silent_context();
         for (const std::string& path : outputs_.folders) {
             std::vector<NumberedMeshes> parts;
+            const std::size_t frames = run_->recording().poses[0].frames.size();
+            const double rate = scene_.step.frames_per_second;
             MeltingSurface melting = melting_surface();
             session_.warn(melting.warnings);
             if (!melting.is_empty())
-                parts.push_back({mesh_names(path, melting.name()), [&](std::size_t frame) {
-                                     return melting_mesh(melting, run_->recording(), frame, ready_.origin,
-                                                         options_.as_surfels, silent);
-                                 }});
+                parts.push_back({mesh_names(path, melting.name()), {frames, rate, [&](std::size_t frame) {
+                                                                        return melting_mesh(
+                                                                            melting, run_->recording(), frame,
+                                                                            ready_.origin, options_.as_surfels, silent);
+                                                                    }}});
             for (std::size_t b = 0; b < ready_.bodies.size(); ++b)
                 if (!melting.has_body(b))
-                    parts.push_back({mesh_names(path, ready_.bodies[b].name),
-                                     [&, b](std::size_t frame) { return run_->mesh(b, frame, silent); }});
+                    parts.push_back({mesh_names(path, ready_.bodies[b].name), {frames, rate, [&, b](std::size_t frame) {
+                                                                                   return run_->mesh(b, frame, silent);
+                                                                               }}});
             session_.begin_writing(path);
-            const std::size_t frames = run_->recording().poses[0].frames.size();
-            session_.warn(require(write_numbered_meshes(frames, parts, session_.context())));
+            session_.warn(require(write_numbered_meshes(parts, session_.context())));
         }
     }
 

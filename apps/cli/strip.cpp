@@ -1,10 +1,9 @@
-#include "chunks.h"
 #include "commands.h"
+#include "reference.h"
 #include "session.h"
 #include "spill.h"
 
 #include "filigree/deform/fidelity.h"
-#include "filigree/io/shared_strip.h"
 
 #include <filesystem>
 
@@ -17,7 +16,9 @@ namespace {
 struct StripCommandOptions {
     std::string input, output, driver;
     StripOptions strip;
-    std::string memory, chunk;
+    bool with_reference_code = false;
+    unsigned references = 3;
+    std::string memory;
     std::optional<double> fidelity;
     PoseSource fidelity_from = PoseSource::positions;
 };
@@ -95,49 +96,16 @@ void bound_memory(const StripCommandOptions& options) {
                                           options.memory + "; give no --memory, or write to another disk.");
 }
 
-/// Makes the model together with other processes.
-void strip_chunk(const StripCommandOptions& options, Session& session) {
-    WorkChunk chunk = chunk_of(options.chunk);
-    if (options.input == "-" || options.output == "-")
-        refuse("--chunk reads and writes files by their names, which other processes use too; '-' has none.");
-    if (options.strip.code != DetailCode::blend) refuse("--chunk is for the blend code: leave out --code reference.");
-    check_folder_of(options.output);
-    const double start = now_seconds();
-    const std::vector<std::filesystem::path> mesh{options.input};
-    chunk.job = require(hash_of_files(mesh)) + '\n' +
-                session.settings_but({"mesh", "--output", "--chunk", "--memory", "--threads", "--quiet", "--json"});
-    const SharedStrip strip{.path = options.output, .options = options.strip, .read = [&]() -> Result<Mesh> {
-                                return session.read_mesh(options.input);
-                            }};
-    session.begin_writing(options.output);
-    const SharedStripReport made = require(strip_in_chunks(strip, chunk, session.context()));
-    const double seconds = now_seconds() - start;
-    Report report;
-    report.say(made.tasks == 0
-                   ? fmt::format("{}: was made before\n", options.output)
-                   : fmt::format("{}: chunk {} of {}: {} of {} tasks made in {}, of which {} waiting for others\n",
-                                 options.output, chunk.number, chunk.count, made.made, made.tasks,
-                                 seconds_text(seconds), seconds_text(made.waited)));
-    report.set("output", options.output);
-    report.set("chunk", chunk.number);
-    report.set("chunks", chunk.count);
-    report.set("made", made.made);
-    report.set("tasks", made.tasks);
-    report.set("waited", made.waited);
-    report.set("is_whole", true);
-    report.set("seconds", seconds);
-    Json steps = Json::object();
-    for (const auto& [step, took] : made.step_seconds) steps[step] = took;
-    report.set("step_seconds", steps);
-    session.print(report);
-}
-
 void run(const StripCommandOptions& options, Session& session) {
     refuse_mesh_name(options.output);
     bound_memory(options);
     if (!options.fidelity && !session.first_given({"--fidelity-from"}).empty())
         refuse("--fidelity-from belongs to --fidelity.");
-    if (!options.chunk.empty()) return strip_chunk(options, session);
+    if (options.with_reference_code) {
+        ReferenceOptions reference{.references = options.references, .base = options.strip.base};
+        if (options.strip.levels) reference.max_levels = *options.strip.levels;
+        return strip_with_reference_code(options.input, options.output, reference, session);
+    }
     const double start = now_seconds();
     Mesh mesh = session.read_mesh(options.input);
     const double read = now_seconds();
@@ -171,68 +139,60 @@ void run(const StripCommandOptions& options, Session& session) {
 Command strip_command() {
     const auto options = std::make_shared<StripCommandOptions>();
     StripOptions& strip = options->strip;
-    return {.name = "strip",
-            .text = "Take the detail off a mesh: make a model with a light driver",
-            .options =
-                {Option("mesh", options->input, "Mesh to strip").is_read().required(),
-                 output_option(options->output, "Model file to write (.fil)"),
-                 Option("--base", strip.base, "Vertices of the driver (unset: 1,000, fewer for small meshes)")
-                     .whole_from(3)
-                     .excludes({"--levels", "--error", "--fidelity"}),
-                 Option("--driver", options->driver,
-                        "Mesh to bind to, made elsewhere: its vertices are the driver's; restored meshes have them "
-                        "behind their own")
-                     .is_read()
-                     .excludes({"--base", "--levels", "--error", "--fidelity", "--fidelity-from", "--max-edge",
-                                "--code", "--references"}),
-                 Option("--levels", strip.levels, "Levels to remove, each leaves a quarter of the vertices")
-                     .whole_from(1)
-                     .excludes({"--error", "--fidelity"}),
-                 Option("--error", strip.error, "How far the driver may leave the mesh (rms), fraction of the diagonal")
-                     .above_zero()
-                     .excludes({"--fidelity"}),
-                 Option("--fidelity", options->fidelity,
-                        "Smallest driver that restores bends, twists, tapers and random warps to this rms error, "
-                        "fraction of the diagonal")
-                     .above_zero(),
-                 choice<PoseSource>("--fidelity-from", options->fidelity_from,
-                                    {{"positions", PoseSource::positions}, {"gradients", PoseSource::gradients}},
-                                    "What poses will come with: positions (default) or gradients too"),
-                 Option("--max-edge", strip.max_edge,
-                        "Longest edge that simplifying may leave, fraction of the diagonal: flat parts keep "
-                        "vertices")
-                     .above_zero(),
-                 choice<DetailCode>("--code", strip.code,
-                                    {{"blend", DetailCode::blend}, {"reference", DetailCode::reference}},
-                                    "blend: any mesh (default); reference: the report's, for regular quads"),
-                 choice<Precision>("--precision", strip.precision,
-                                   {{"float", Precision::float32}, {"int16", Precision::int16}},
-                                   "Of the blend code: float, 20 bytes a vertex (default), or int16, 10 bytes"),
-                 Option("--reorder", strip.reorder,
-                        "Renumber vertices by where they are: a mesh whose order is hopeless restores faster; "
-                        "'restore --input-order' gives meshes in the old order")
-                     .excludes({"--driver"}),
-                 Option("--memory", options->memory,
-                        "How much its arrays may take, such as 8G; the others lie in a file beside the output while it "
-                        "runs (unset: three quarters of what is free)")
-                     .named("SIZE"),
-                 Option("--one-piece", strip.one_piece,
-                        "Levels of more vertices are made in clusters, on all threads; the others in one piece")
-                     .whole_from(1)
-                     .with_default(),
-                 Option("--chunk", options->chunk,
-                        "K/N: be the K-th of N processes, on any machines, that make the model together")
-                     .excludes({"--driver", "--fidelity"}),
-                 Option("--references", strip.references, "Of the reference code: coarse points that a point refers to")
-                     .one_of({"3", "4", "6"})
-                     .with_default()},
-            .examples = "  filigree strip scan.ply -o scan.fil\n"
-                        "  filigree strip scan.ply -o scan.fil --base 5000 --precision int16\n"
-                        "  filigree strip scan.ply -o scan.fil --fidelity 1e-5\n"
-                        "  filigree strip scan.ply -o scan.fil --driver cage.obj\n"
-                        "  filigree strip scan.ply -o scan.fil --chunk 3/40\n"
-                        "  filigree strip cube.obj -o cube.fil --code reference",
-            .run = [options](Session& session) { run(*options, session); }};
+    return {
+        .name = "strip",
+        .text = "Take the detail off a mesh: make a model with a light driver",
+        .options =
+            {Option("mesh", options->input, "Mesh to strip").is_read().required(),
+             output_option(options->output, "Model file to write (.fil)"),
+             Option("--base", strip.base, "Vertices of the driver (unset: 1,000, fewer for small meshes)")
+                 .whole_from(3)
+                 .excludes({"--levels", "--error", "--fidelity"}),
+             Option("--driver", options->driver,
+                    "Mesh to bind to, made elsewhere: its vertices are the driver's; restored meshes have them "
+                    "behind their own")
+                 .is_read()
+                 .excludes({"--base", "--levels", "--error", "--fidelity", "--fidelity-from", "--max-edge", "--code",
+                            "--references"}),
+             Option("--levels", strip.levels, "Levels to remove, each leaves a quarter of the vertices")
+                 .whole_from(1)
+                 .excludes({"--error", "--fidelity"}),
+             Option("--error", strip.error, "How far the driver may leave the mesh (rms), fraction of the diagonal")
+                 .above_zero()
+                 .excludes({"--fidelity"}),
+             Option("--fidelity", options->fidelity,
+                    "Smallest driver that restores bends, twists, tapers and random warps to this rms error, "
+                    "fraction of the diagonal")
+                 .above_zero(),
+             choice<PoseSource>("--fidelity-from", options->fidelity_from,
+                                {{"positions", PoseSource::positions}, {"gradients", PoseSource::gradients}},
+                                "What poses will come with: positions (default) or gradients too"),
+             Option("--max-edge", strip.max_edge,
+                    "Longest edge that simplifying may leave, fraction of the diagonal: flat parts keep "
+                    "vertices")
+                 .above_zero(),
+             choice<bool>("--code", options->with_reference_code, {{"blend", false}, {"reference", true}},
+                          "blend: any mesh (default); reference: the report's, for regular quads"),
+             choice<Precision>("--precision", strip.precision,
+                               {{"float", Precision::float32}, {"int16", Precision::int16}},
+                               "Of the blend code: float, 20 bytes a vertex (default), or int16, 10 bytes"),
+             Option("--reorder", strip.reorder,
+                    "Renumber vertices by where they are: a mesh whose order is hopeless restores faster; "
+                    "'restore --input-order' gives meshes in the old order")
+                 .excludes({"--driver"}),
+             Option("--memory", options->memory,
+                    "How much its arrays may take, such as 8G; the others lie in a file beside the output while it "
+                    "runs (unset: three quarters of what is free)")
+                 .named("SIZE"),
+             Option("--references", options->references, "Of the reference code: coarse points that a point refers to")
+                 .one_of({"3", "4", "6"})
+                 .with_default()},
+        .examples = "  filigree strip scan.ply -o scan.fil\n"
+                    "  filigree strip scan.ply -o scan.fil --base 5000 --precision int16\n"
+                    "  filigree strip scan.ply -o scan.fil --fidelity 1e-5\n"
+                    "  filigree strip scan.ply -o scan.fil --driver cage.obj\n"
+                    "  filigree strip cube.obj -o cube.fil --code reference",
+        .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

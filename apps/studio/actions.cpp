@@ -1,9 +1,11 @@
 #include "actions.h"
 
+#include "coloring.h"
 #include "file_dialogs.h"
 #include "icons.h"
 #include "panels/panels.h"
 #include "pins.h"
+#include "tools/tool.h"
 #include "window.h"
 #include "words.h"
 
@@ -29,7 +31,7 @@ struct Command {
     QString keys = {};                      ///< "": no shortcut
     std::function<void()> run = {};
     std::function<bool()> can = {}; ///< unset: always
-    std::optional<Icon> icon = {};
+    QIcon icon = {};
     std::function<bool()> is_on = {}; ///< unset: it is no switch
     const char* group = "";           ///< of switches of which one is on
 };
@@ -87,15 +89,15 @@ struct Actions::Impl {
     }
     /// One of several values of a field of the view settings.
     template <class T>
-    Command view_choice(const char* group, const char* name, const QString& text, const QString& tip, const char* keys,
-                        T ViewSettings::*field, T value, std::optional<Icon> icon = {}) {
+    Command view_choice(const char* group, const QString& name, const QString& text, const QString& tip,
+                        const char* keys, T ViewSettings::*field, T value, const QIcon& picture = {}) {
         return {name,
                 text,
                 tip,
                 keys,
                 [this, field, value] { workbench.view().edit([&](ViewSettings& s) { s.*field = value; }); },
                 {},
-                icon,
+                picture,
                 [this, field, value] { return view().*field == value; },
                 group};
     }
@@ -125,10 +127,10 @@ struct Actions::Impl {
              "Ctrl+O",
              [this] { open(); },
              {},
-             Icon::open},
+             icon(Icon::open)},
             kSeparator,
             {"file.save", "&Save", "Saves the model with its deformation and recording", "Ctrl+S", [this] { save(); },
-             has_model, Icon::save},
+             has_model, icon(Icon::save)},
             {"file.save_as", "Save &as…", "Saves the model under another name", "Ctrl+Shift+S", [this] { save_as(); },
              has_model},
             kSeparator,
@@ -137,7 +139,7 @@ struct Actions::Impl {
                  save_to({"file.save_mesh", "Save the mesh", {kMeshes, kAll}, "obj", proposal("_deformed.obj")},
                          &Workbench::save_mesh);
              },
-             has_model, Icon::meshes},
+             has_model, icon(Icon::meshes)},
             {"file.save_driver", "Save &driver…", "Saves the driver as it is posed now, for another program to move",
              "",
              [this] {
@@ -152,9 +154,9 @@ struct Actions::Impl {
             kSeparator,
             {"file.export_film", "Export &film…",
              "Writes the recording as a film, seen as now (MP4, GIF or numbered PNGs)", "Ctrl+Shift+E",
-             [this] { export_film(); }, has_recording, Icon::film},
+             [this] { export_film(); }, has_recording, icon(Icon::film)},
             {"file.export_meshes", "Export mes&hes…", "Writes a mesh for each frame of the recording", "",
-             [this] { export_meshes(); }, has_recording, Icon::meshes},
+             [this] { export_meshes(); }, has_recording, icon(Icon::meshes)},
             kSeparator,
             {"file.quit", "&Quit", "Leaves; asks about unsaved changes first", "Ctrl+Q", [this] { window.close(); }},
         };
@@ -164,9 +166,9 @@ struct Actions::Impl {
         QUndoStack& history = workbench.document().undo_stack();
         return {
             {"edit.undo", "&Undo", "Undo", "Ctrl+Z", [&history] { history.undo(); },
-             [&history] { return history.canUndo(); }, Icon::undo},
+             [&history] { return history.canUndo(); }, icon(Icon::undo)},
             {"edit.redo", "&Redo", "Redo", "Ctrl+Shift+Z", [&history] { history.redo(); },
-             [&history] { return history.canRedo(); }, Icon::redo},
+             [&history] { return history.canRedo(); }, icon(Icon::redo)},
             kSeparator,
             {"quads.make", "Make &quads", "Makes the mesh regular quads in patches, as the Quads panel says", "Q",
              [this] {
@@ -183,10 +185,10 @@ struct Actions::Impl {
             {"fracture.whole", "Make &whole", "The mesh as it was before it was cut", "Shift+X",
              [this] { workbench.make_whole(); }, [this] { return has_model() && workbench.state().source->pieces; }},
             {"detail.remove", "&Remove detail", "One level coarser", "PgDown", [this] { workbench.remove_detail(); },
-             [this] { return can_remove_detail(); }, Icon::minus},
+             [this] { return can_remove_detail(); }, icon(Icon::minus)},
             {"detail.add", "&Add detail", "One level finer", "PgUp", [this] { workbench.add_detail(); },
              [this] { return has_model() && workbench.state().level() < workbench.state().model->finest_level(); },
-             Icon::plus},
+             icon(Icon::plus)},
             kSeparator,
             {"deform.open", "De&form", "The deformations: stretch, squeeze, bend, twist, taper, and pulling by hand",
              "F",
@@ -194,30 +196,31 @@ struct Actions::Impl {
                  workbench.set_mode(Mode::deform);
                  window.show_panel("deform");
              },
-             has_model, Icon::deform},
+             has_model, icon(Icon::deform)},
             {"edit.reset_deformation", "Reset &deformation", "Back to the shape at rest: no sliders, pulls or pins",
              "Ctrl+R", [this] { workbench.reset_deformation(); },
              [this] {
                  const State& state = workbench.state();
                  return !state.warps.none() || !state.handles.empty() || state.handle_pose;
              },
-             Icon::reset},
+             icon(Icon::reset)},
             {"edit.unpin_all", "Unp&in all", "Takes out all pins", "Ctrl+Shift+P", [this] { workbench.unpin_all(); },
              [this] { return has_pins(workbench.state().handles); }},
             kSeparator,
-            view_choice("tools", "tool.pull", "&Pull", "Drag the surface to pull it", "P", &ViewSettings::tool,
-                        Tool::pull, Icon::pull),
-            view_choice("tools", "tool.pin", "Pi&n", "Click or paint the surface to pin it; with Ctrl to take pins out",
-                        "N", &ViewSettings::tool, Tool::pin, Icon::pin),
-            view_choice("tools", "tool.turn", "&Turn", "Drag anywhere to turn the view", "T", &ViewSettings::tool,
-                        Tool::turn, Icon::turn),
-            view_choice("tools", "tool.torch", "&Torch",
-                        "Hold the mouse on a body that melts to warm it; with Ctrl to cool", "H", &ViewSettings::tool,
-                        Tool::torch, Icon::torch),
-            kSeparator,
-            {"edit.cancel", "&Cancel", "Stops the work that runs, or lets go of a pull as if it had not been", "Esc",
-             [this] { cancel(); }, [this] { return workbench.jobs().is_busy() || workbench.is_pulling(); }},
         };
+    }
+
+    /// The lower part of the menu Edit.
+    std::vector<Command> tool_menu() {
+        std::vector<Command> menu;
+        for (const ToolEntry* const tool : kTools)
+            menu.push_back(view_choice("tools", QStringLiteral("tool.") + tool->name, tool->text, tool->tip, tool->keys,
+                                       &ViewSettings::tool, tool, icon(tool->icon)));
+        menu.push_back(kSeparator);
+        menu.push_back({"edit.cancel", "&Cancel",
+                        "Stops the work that runs, or lets go of a pull as if it had not been", "Esc",
+                        [this] { cancel(); }, [this] { return workbench.jobs().is_busy() || workbench.is_pulling(); }});
+        return menu;
     }
 
     /// The upper part of the view's menu.
@@ -229,7 +232,7 @@ struct Actions::Impl {
             look("view.top", "&Top", "Looks from above", "3", View::top),
             look("view.iso", "&Corner", "Looks from the front, the right and above", "4", View::iso),
             {"view.show_all", "Show &all", "The whole object, as large as it fits", "0",
-             [this] { viewport.show_all(); }, has_model, Icon::show_all},
+             [this] { viewport.show_all(); }, has_model, icon(Icon::show_all)},
             kSeparator,
             view_choice("styles", "view.shaded", "S&haded", "The surface alone", "S", &V::style, SurfaceStyle::shaded),
             view_choice("styles", "view.edges", "Shaded with &edges", "The surface and the edges of its faces", "E",
@@ -237,26 +240,18 @@ struct Actions::Impl {
             view_choice("styles", "view.wireframe", "&Wireframe", "The edges of the faces alone", "W", &V::style,
                         SurfaceStyle::wireframe),
             kSeparator,
-            view_choice("colors", "view.color_own", "&Own colours", "The mesh's own colours", "Shift+1", &V::coloring,
-                        Coloring::own),
-            view_choice("colors", "view.color_error", "E&rror as colours",
-                        "How far each vertex is from the full deformation", "Shift+2", &V::coloring, Coloring::error),
-            view_choice("colors", "view.color_levels", "&Levels as colours", "The level at which each vertex is added",
-                        "Shift+3", &V::coloring, Coloring::levels),
-            view_choice("colors", "view.color_patches", "Patc&hes as colours",
-                        "The patches of regular quads, each in a colour unlike its neighbours'", "Shift+4",
-                        &V::coloring, Coloring::patches),
-            view_choice("colors", "view.color_expected", "E&xpected error as colours",
-                        "Where the pose is more curved than the driver can follow", "Shift+5", &V::coloring,
-                        Coloring::expected_error),
-            view_choice("colors", "view.color_pieces", "Pi&eces as colours", "Each piece of a mesh that breaks",
-                        "Shift+6", &V::coloring, Coloring::pieces),
-            view_choice("colors", "view.color_heat", "&Heat as colours", "How warm a body that melts is", "Shift+7",
-                        &V::coloring, Coloring::heat),
-            {"view.measure_error", "M&easure error", "Measures what is shown against the full deformation", "Ctrl+M",
-             [this] { workbench.measure_error(); }, has_model},
-            kSeparator,
         };
+    }
+
+    std::vector<Command> color_menu() {
+        std::vector<Command> menu;
+        for (const Coloring* const coloring : colorings())
+            menu.push_back(view_choice("colors", QStringLiteral("view.color_") + coloring->name, coloring->text,
+                                       coloring->tip, coloring->keys, &ViewSettings::coloring, coloring));
+        menu.push_back({"view.measure_error", "M&easure error", "Measures what is shown against the full deformation",
+                        "Ctrl+M", [this] { workbench.measure_error(); }, has_model});
+        menu.push_back(kSeparator);
+        return menu;
     }
 
     std::vector<Command> view_menu() {
@@ -298,18 +293,18 @@ struct Actions::Impl {
                  workbench.animate();
                  window.show_panel("body");
              },
-             has_model, Icon::animate},
+             has_model, icon(Icon::animate)},
             kSeparator,
             {"body.play", "&Play", "Moves the body; makes it where there is none", "Space",
-             [this] { workbench.play(); }, is_at_rest, Icon::play},
+             [this] { workbench.play(); }, is_at_rest, icon(Icon::play)},
             {"body.pause", "P&ause", "Stops where it is", "Space", [this] { workbench.pause(); },
-             [this] { return workbench.is_playing(); }, Icon::pause},
-            {"body.step", "&Step", "One frame on", "Right", [this] { workbench.step(); }, is_at_rest, Icon::step},
+             [this] { return workbench.is_playing(); }, icon(Icon::pause)},
+            {"body.step", "&Step", "One frame on", "Right", [this] { workbench.step(); }, is_at_rest, icon(Icon::step)},
             {"body.back", "Step &back", "One frame back in the recording", "Left",
              [this] { workbench.go_to_frame(workbench.frame() - 1); },
              [this] { return workbench.frame_count() > 0 && workbench.frame() > 0 && !workbench.is_playing(); }},
             {"body.reset", "&Reset", "Back to the start; empties the recording", "Home", [this] { workbench.reset(); },
-             [this] { return workbench.playback().has_body() || has_recording(); }, Icon::reset},
+             [this] { return workbench.playback().has_body() || has_recording(); }, icon(Icon::reset)},
             kSeparator,
             {"body.melt", "&Melt", "Puts a body that melts into warm air, and plays", "Ctrl+Shift+M",
              [this] { workbench.melt(); }, [this] { return has_model() && workbench.can_melt(); }},
@@ -340,7 +335,7 @@ struct Actions::Impl {
         action->setObjectName(command.name);
         if (!command.keys.isEmpty()) action->setShortcut(QKeySequence(command.keys, QKeySequence::PortableText));
         describe(action, command.tip);
-        if (command.icon) action->setIcon(icon(*command.icon));
+        if (!command.icon.isNull()) action->setIcon(command.icon);
         action->setCheckable(bool(command.is_on));
         if (*command.group) {
             QActionGroup*& group = groups[command.group];
@@ -451,10 +446,12 @@ struct Actions::Impl {
 
 Actions::Actions(Workbench& workbench, Viewport& viewport, MainWindow& window)
     : impl_(new Impl(*this, workbench, viewport, window)) {
-    std::vector<Command> view = impl_->look_menu();
+    std::vector<Command> edit = impl_->edit_menu(), view = impl_->look_menu();
+    std::ranges::copy(impl_->tool_menu(), std::back_inserter(edit));
+    std::ranges::copy(impl_->color_menu(), std::back_inserter(view));
     std::ranges::copy(impl_->view_menu(), std::back_inserter(view));
     impl_->add_menu("menu.file", "&File", impl_->file_menu());
-    impl_->add_menu("menu.edit", "&Edit", impl_->edit_menu());
+    impl_->add_menu("menu.edit", "&Edit", edit);
     impl_->add_menu("menu.view", "&View", view);
     impl_->add_menu("menu.body", "&Body", impl_->body_menu());
     impl_->add_menu("menu.help", "&Help", impl_->help_menu());

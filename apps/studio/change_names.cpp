@@ -44,11 +44,8 @@ QString name_of_change(const Shape& before, const Shape& after) {
 }
 
 QString name_of_change(const StripOptions& before, const StripOptions& after) {
-    if (before.code != after.code)
-        return after.code == DetailCode::blend ? "Blend code" : "Reference code of the report";
     if (before.precision != after.precision)
         return after.precision == Precision::float32 ? "Full precision" : "Half-size precision";
-    if (before.references != after.references) return QString("%1 references").arg(after.references);
     if (after.base) return "Driver of " + counted(*after.base, "vertex", "vertices");
     if (after.levels) return counted(*after.levels, "level", "levels") + " of detail";
     if (after.error) return QString("Driver within %1 % of the mesh").arg(100 * *after.error);

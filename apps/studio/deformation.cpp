@@ -171,8 +171,8 @@ void HandleDrag::move(const Vec3f& way) {
     impl_->wake.notify_all();
 }
 
-std::shared_ptr<const Pose> HandleDrag::finish() {
-    if (!impl_) return nullptr;
+Result<std::shared_ptr<const Pose>> HandleDrag::finish() {
+    if (!impl_) return std::shared_ptr<const Pose>();
     std::shared_ptr<const Pose> pose;
     std::optional<Error> error;
     {
@@ -185,8 +185,9 @@ std::shared_ptr<const Pose> HandleDrag::finish() {
         error = impl_->error;
     }
     stop();
-    if (error) Q_EMIT failed(*error);
-    return pose;
+    if (!error) return pose;
+    Q_EMIT failed(*error);
+    return *error;
 }
 
 void HandleDrag::stop() {

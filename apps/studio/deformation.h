@@ -39,9 +39,9 @@ public:
                std::optional<Index> grabbed = {});
     /// How far the pull's vertices, or what was grabbed, are to be from where they started.
     void move(const Vec3f& way);
-    /// Waits for the solution of the last move and returns it; null when it failed. The drag is over. Of a driver so
-    /// large that this takes seconds, what there is by then; null before the first solution.
-    std::shared_ptr<const Pose> finish();
+    /// Waits for the solution of the last move and returns it. The drag is over. Of a driver so large that this takes
+    /// seconds, what there is by then; null before the first solution, and without a drag. Errors: what failed() tells.
+    Result<std::shared_ptr<const Pose>> finish();
     /// How far the pull's vertices went in the pose that finish() returned: the move and what was added to it.
     const Vec3f& applied() const { return applied_; }
     void stop(); ///< at once; the drag is over, and leaves nothing

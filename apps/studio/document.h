@@ -98,7 +98,7 @@ struct State {
     StripOptions strip;         ///< what the model was made with
     StripReport strip_report;
     std::shared_ptr<const Model> model; ///< its mesh is the source's
-    RestoreOptions restore;             ///< law and thin shell; level: the one shown, always set
+    RestoreOptions restore;             ///< level: the one shown, always set
     Warps warps;
     std::vector<Handle> handles;
     std::shared_ptr<const Pose> handle_pose; ///< the driver as the pulls left it; null: at rest

@@ -1,7 +1,7 @@
 // One picture or several side by side: quickly while things move, pass by pass when they are still.
 #pragma once
 
-#include "filigree/render/renderer.h"
+#include "filigree/render.h"
 
 #include <functional>
 #include <vector>

@@ -17,20 +17,15 @@ const std::string kTopic = "expected error";
 constexpr std::chrono::milliseconds kLeastPause(150); // between two looks: as fast as one reads numbers
 constexpr int kPauses = 4;                            // so many times as long as a look took
 
-bool is_judged(const State& state) { return state.model && state.model->code() == DetailCode::blend; }
+bool is_judged(const State& state) { return state.model != nullptr; }
 
 } // namespace
 
 /// What every pose of a model is judged with. Of one job at a time.
 struct ExpectedError::Judge {
     std::shared_ptr<const Model> model;
-    RestoreOptions restore;
     Restorer restorer;
     PoseError error;
-
-    bool is_for(const Model& other, const RestoreOptions& options) const {
-        return model.get() == &other && restore == options;
-    }
 };
 
 struct ExpectedError::Judgement {
@@ -95,18 +90,17 @@ void ExpectedError::look_soon() {
 }
 
 void ExpectedError::look() {
-    RestoreOptions options = workbench_.state().restore;
-    options.level = 0; // gradients are the driver's alone
     jobs_.start<Judgement>(
         "The expected error", kTopic,
-        [judge = judge_, model = model_, options, pose = *workbench_.pose(),
+        [judge = judge_, model = model_, pose = *workbench_.pose(),
          with_colors = wants_colors_](const RunContext& cancels) mutable -> Result<Judgement> {
             const auto begin = Clock::now();
             const RunContext context(1); // the others are for what moves
-            if (!judge || !judge->is_for(*model, options)) {
-                Result<Restorer> restorer = Restorer::create(*model, options, context);
+            if (!judge || judge->model != model) {
+                // Gradients are the driver's alone.
+                Result<Restorer> restorer = Restorer::create(*model, {.level = 0}, context);
                 if (!restorer) return restorer.error();
-                judge.reset(new Judge{model, options, std::move(*restorer), PoseError(*model, context)});
+                judge.reset(new Judge{model, std::move(*restorer), PoseError(*model, context)});
             }
             if (cancels.is_cancelled()) return cancelled_error();
             const Result<std::vector<Mat3f>> gradients = judge->restorer.gradients(pose, context);

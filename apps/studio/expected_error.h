@@ -5,7 +5,7 @@
 #include "jobs.h"
 
 #include "filigree/hierarchy/pose_error.h"
-#include "filigree/render/color_map.h"
+#include "filigree/render.h"
 
 #include <QTimer>
 

@@ -2,6 +2,7 @@
 
 #include "actions.h"
 #include "controls.h"
+#include "tools/tool.h"
 
 #include <QBoxLayout>
 #include <QDialog>
@@ -27,13 +28,8 @@ constexpr std::array kGroups = {
     Group{"View", "view", 2},
 };
 
-struct Gesture {
-    const char *mouse, *does;
-};
+/// The mouse's whatever the tool.
 constexpr std::array kGestures = {
-    Gesture{"Drag the surface", "pulls it; with the tool Pin: pins it"},
-    Gesture{"Ctrl+drag", "with the tool Pin: takes pins out"},
-    Gesture{"Hold the surface", "with the tool Torch: warms a body that melts; with Ctrl: cools it"},
     Gesture{"Drag a knob", "deforms as the sliders do"},
     Gesture{"Drag beside it", "turns the view; so does a right drag"},
     Gesture{"Middle drag", "moves the view; so does Shift+drag"},
@@ -70,6 +66,9 @@ public:
         };
 
         QString mouse;
+        for (const ToolEntry* const tool : kTools)
+            for (const Gesture& gesture : tool->gestures)
+                mouse += row(QString(tool->text).remove('&') + ": " + gesture.mouse, gesture.does);
         for (const Gesture& gesture : kGestures) mouse += row(gesture.mouse, gesture.does);
         add(0, "Mouse", mouse);
         for (const Group& group : kGroups) {

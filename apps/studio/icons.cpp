@@ -11,32 +11,12 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <vector>
 
 namespace filigree::studio {
 namespace {
 
-/// What a stroke's numbers are, in a square of 16 by 16, y down. Angles in degrees, counter-clockwise, 0: right.
-enum class Kind {
-    line,    ///< x, y of two points or more
-    polygon, ///< the same, closed
-    solid,   ///< the same, filled
-    ellipse, ///< x, y of the middle, radius
-    arc,     ///< x, y, width, height of the whole ellipse's box, first angle, angle from there
-    box,     ///< x, y, width, height
-    bar,     ///< the same, filled
-    dot,     ///< x, y
-    curve,   ///< x, y of the start, then of three points for each cubic
-    head,    ///< of an arrow: x, y of its tip, the angle it points along, length
-    cube,    ///< x, y of the middle, radius
-};
-struct Stroke {
-    Kind kind;
-    std::vector<double> numbers;
-};
-
 const std::vector<Stroke>& strokes_of(Icon kind) {
-    using enum Kind;
+    using enum StrokeKind;
     static const std::map<Icon, std::vector<Stroke>> table = {
         {Icon::open,
          {{line, {2, 13, 2, 3.5, 6, 3.5, 7.5, 5.5, 12.5, 5.5, 12.5, 7.5}},
@@ -47,22 +27,6 @@ const std::vector<Stroke>& strokes_of(Icon kind) {
           {box, {5.5, 2.5, 4, 3}}}},
         {Icon::undo, {{arc, {3, 4.5, 10, 8.5, -80, 215}}, {head, {3.4, 7.2, 250, 3.8}}}},
         {Icon::redo, {{arc, {3, 4.5, 10, 8.5, 260, -215}}, {head, {12.6, 7.2, 290, 3.8}}}},
-        {Icon::pull, // a surface that follows an arrow
-         {{curve, {1.5, 13, 6, 13, 6, 8.5, 8, 8.5, 10, 8.5, 10, 13, 14.5, 13}},
-          {line, {8, 6.2, 8, 1.8}},
-          {head, {8, 1.6, 90, 3.4}}}},
-        {Icon::pin, {{ellipse, {8, 5.2, 3.2}}, {line, {8, 8.4, 8, 13.6}}, {line, {4.5, 13.6, 11.5, 13.6}}}},
-        {Icon::turn,
-         {{ellipse, {8, 8, 2.2}},
-          {arc, {2, 2, 12, 12, 20, 130}},
-          {arc, {2, 2, 12, 12, 200, 130}},
-          {head, {13.7, 6, 290, 3.2}},
-          {head, {2.3, 10, 110, 3.2}}}},
-        {Icon::torch, // a flame over its handle
-         {{curve,
-           {8, 1.5, 9, 4, 12, 5.5, 12, 8.5, 12, 11, 10, 12, 8, 12, 6, 12, 4, 11, 4, 8.5, 4, 6.5, 6.5, 5, 8, 1.5}},
-          {line, {8, 12, 8, 15}},
-          {line, {6, 15, 10, 15}}}},
         {Icon::play, {{solid, {4.5, 2.8, 13, 8, 4.5, 13.2}}}},
         {Icon::pause, {{bar, {3.8, 2.8, 3.1, 10.4}}, {bar, {9.1, 2.8, 3.1, 10.4}}}},
         {Icon::step, {{solid, {3, 3, 10, 8, 3, 13}}, {bar, {11.2, 2.6, 2.2, 10.8}}}},
@@ -114,33 +78,33 @@ void draw(QPainter& painter, const Stroke& stroke, const QColor& color) {
     QPolygonF points;
     for (std::size_t k = 0; k + 1 < n.size(); k += 2) points << QPointF(n[k], n[k + 1]);
     switch (stroke.kind) {
-    case Kind::line:
+    case StrokeKind::line:
         return painter.drawPolyline(points);
-    case Kind::polygon:
+    case StrokeKind::polygon:
         return painter.drawPolygon(points);
-    case Kind::solid:
+    case StrokeKind::solid:
         painter.setBrush(color);
         painter.drawPolygon(points);
         return painter.setBrush(Qt::NoBrush);
-    case Kind::ellipse:
+    case StrokeKind::ellipse:
         return painter.drawEllipse(points[0], n[2], n[2]);
-    case Kind::arc:
+    case StrokeKind::arc:
         return painter.drawArc(QRectF(n[0], n[1], n[2], n[3]), int(16 * n[4]), int(16 * n[5]));
-    case Kind::box:
+    case StrokeKind::box:
         return painter.drawRect(QRectF(n[0], n[1], n[2], n[3]));
-    case Kind::bar:
+    case StrokeKind::bar:
         return painter.fillRect(QRectF(n[0], n[1], n[2], n[3]), color);
-    case Kind::dot:
+    case StrokeKind::dot:
         return painter.drawPoint(points[0]);
-    case Kind::curve: {
+    case StrokeKind::curve: {
         QPainterPath path(points[0]);
         for (qsizetype k = 1; k + 2 < points.size(); k += 3) path.cubicTo(points[k], points[k + 1], points[k + 2]);
         return painter.drawPath(path);
     }
-    case Kind::head:
+    case StrokeKind::head:
         for (const double side : {150.0, -150.0}) painter.drawLine(points[0], points[0] + towards(n[2] + side, n[3]));
         return;
-    case Kind::cube:
+    case StrokeKind::cube:
         points.clear();
         for (int k = 0; k < 6; ++k) points << QPointF(n[0], n[1]) + towards(30 + 60 * k, n[2]);
         painter.drawPolygon(points);
@@ -150,14 +114,15 @@ void draw(QPainter& painter, const Stroke& stroke, const QColor& color) {
 
 class DrawnIcon : public QIconEngine {
 public:
-    explicit DrawnIcon(Icon kind) : kind_(kind) {}
+    /// color: of a palette; null: that of buttons' texts.
+    explicit DrawnIcon(const std::vector<Stroke>& strokes, QColor (*color)(const QPalette&) = nullptr)
+        : strokes_(strokes), color_(color) {}
 
     void paint(QPainter* painter, const QRect& rect, QIcon::Mode mode, QIcon::State) override {
         const QPalette palette = QGuiApplication::palette();
         QColor color = palette.color(mode == QIcon::Disabled ? QPalette::Disabled : QPalette::Active,
                                      mode == QIcon::Selected ? QPalette::HighlightedText : QPalette::ButtonText);
-        if (kind_ == Icon::good) color = good_color(palette);
-        if (kind_ == Icon::warning) color = bad_color(palette);
+        if (color_) color = color_(palette);
         painter->save();
         painter->setRenderHint(QPainter::Antialiasing);
         const double side = std::min(rect.width(), rect.height());
@@ -165,7 +130,7 @@ public:
         painter->scale(side / 16, side / 16);
         painter->setPen(QPen(color, 1.3, Qt::SolidLine, Qt::RoundCap, Qt::RoundJoin));
         painter->setBrush(Qt::NoBrush);
-        for (const Stroke& stroke : strokes_of(kind_)) draw(*painter, stroke, color);
+        for (const Stroke& stroke : strokes_) draw(*painter, stroke, color);
         painter->restore();
     }
     QPixmap pixmap(const QSize& size, QIcon::Mode mode, QIcon::State state) override {
@@ -175,14 +140,20 @@ public:
         paint(&painter, QRect(QPoint(0, 0), size), mode, state);
         return picture;
     }
-    QIconEngine* clone() const override { return new DrawnIcon(kind_); }
+    QIconEngine* clone() const override { return new DrawnIcon(strokes_, color_); }
 
 private:
-    Icon kind_;
+    const std::vector<Stroke>& strokes_;
+    QColor (*color_)(const QPalette&);
 };
 
 } // namespace
 
-QIcon icon(Icon kind) { return QIcon(new DrawnIcon(kind)); }
+QIcon icon(Icon kind) {
+    const auto color = kind == Icon::good ? good_color : kind == Icon::warning ? bad_color : nullptr;
+    return QIcon(new DrawnIcon(strokes_of(kind), color));
+}
+
+QIcon icon(const std::vector<Stroke>& strokes) { return QIcon(new DrawnIcon(strokes)); }
 
 } // namespace filigree::studio

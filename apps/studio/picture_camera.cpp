@@ -167,6 +167,14 @@ void PictureCamera::follow_body() {
     fly_from(from);
 }
 
+std::vector<QPointF> PictureCamera::places_of(std::span<const Index> some, std::span<const Vec3f> positions,
+                                              const Vec3d& origin) const {
+    std::vector<QPointF> places;
+    for (const Index v : some)
+        if (v < positions.size()) places.push_back(place_of(origin + positions[v].cast<double>()));
+    return places;
+}
+
 // On the way
 
 void PictureCamera::fly_from(const Camera& from) {

@@ -29,6 +29,9 @@ public:
     QPointF from_tile(const Vec3d& place, int tile) const;
     Vec3d project(const Vec3d& world) const; ///< in a tile; z: above 0 in front of the camera
     QPointF place_of(const Vec3d& world) const { return from_tile(project(world), middle_tile()); }
+    /// Of some of the positions, which are relative to an origin.
+    std::vector<QPointF> places_of(std::span<const Index> some, std::span<const Vec3f> positions,
+                                   const Vec3d& origin) const;
 
     void show_all_from(const Vec3d& direction);
     void show_all(); ///< from where it is

@@ -3,7 +3,7 @@
 
 #include "document.h"
 
-#include "filigree/fracture/fracture_pattern.h"
+#include "filigree/fracture.h"
 
 #include <QString>
 

@@ -6,7 +6,7 @@
 #include "pins.h"
 
 #include "filigree/present/textured_look.h"
-#include "filigree/render/renderer.h"
+#include "filigree/render.h"
 
 #include <QCoreApplication>
 #include <QEventLoop>
@@ -289,7 +289,7 @@ void Playback::play() {
 
 void Playback::pause() {
     if (!has_body()) return;
-    const bool was_playing = std::exchange(is_playing_, false);
+    const bool was_playing = std::exchange(is_playing_, false), was_stepping = is_stepping();
     is_grabbed_ = has_torch_ = false;
     worker_->park();
     worker_->change([&] {
@@ -298,6 +298,7 @@ void Playback::pause() {
     });
     worker_->steps_awaited = 0;
     deliver();
+    if (was_stepping) Q_EMIT stepped();
     if (was_playing) Q_EMIT state_changed();
 }
 
@@ -379,6 +380,7 @@ void Playback::deliver() {
         news = std::exchange(worker_->outbox, {});
     }
     delivered_ += news.frames.size();
+    const bool was_stepping = is_stepping();
     worker_->steps_awaited -= std::min(worker_->steps_awaited, news.frames.size());
     for (Worker::Outbox::Frame& frame : news.frames) record(frame.pose, std::move(frame.surface));
     if (news.error) {
@@ -391,6 +393,7 @@ void Playback::deliver() {
     *moment_ = std::move(*news.moment);
     const bool is_full = recorded_bytes_ > kMostRecordedBytes;
     Q_EMIT moved();
+    if (was_stepping && !is_stepping()) Q_EMIT stepped();
     if (is_full && is_playing_) {
         pause();
         Q_EMIT failed({ErrorCode::unsuitable, "The recording is as long as memory allows: save it, then reset."});

@@ -64,6 +64,7 @@ public:
 
 Q_SIGNALS:
     void moved();                    ///< another moment
+    void stepped();                  ///< the frames asked for by step() are there, or will not come
     void state_changed();            ///< body there or not, playing or not
     void failed(const Error& error); ///< of the simulation: the body is removed after this
 

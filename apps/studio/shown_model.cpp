@@ -12,15 +12,7 @@ ShownModel::ShownModel(const State& state, RestoreOn where)
     for (unsigned level = 0; level < levels_.size(); ++level) facts_.push_back(level_facts(*model_, level));
 }
 
-bool ShownModel::is_of(const State& state) const {
-    return state.model == model_ && state.restore.law == restore_.law &&
-           state.restore.thin_shell == restore_.thin_shell;
-}
-
-const std::vector<float>& ShownModel::arrival() {
-    if (arrival_.empty()) arrival_ = vertex_levels(*model_, finest_level());
-    return arrival_;
-}
+bool ShownModel::is_of(const State& state) const { return state.model == model_; }
 
 void ShownModel::ask(unsigned level, bool is_urgent, Jobs& background,
                      std::function<void(std::function<void()>)> upload,

@@ -6,15 +6,16 @@
 #include "jobs.h"
 
 #include "filigree/present/level_shape.h"
-#include "filigree/render/drawable.h"
+#include "filigree/render.h"
 
 namespace filigree::studio {
 
-/// Numbers of the finest mesh's vertices to be shown as colours, with the legend's title.
+/// Numbers of vertices to be shown as colours.
 struct VertexColors {
-    std::vector<float> values; ///< empty: none
+    std::vector<float> values; ///< one a vertex
     ColorMap map = ColorMap::sequential;
-    ValueRange range;
+    ValueRange range = {};
+    std::shared_ptr<const Mesh> melt = {}; ///< whose vertices they are; null: the model's, at its finest level
 };
 
 /// One level in graphics memory. Lives and dies with the OpenGL context current.
@@ -38,8 +39,6 @@ public:
     unsigned finest_level() const { return model_->finest_level(); }
     const std::vector<LevelFacts>& facts() const { return facts_; }
     const Pose& rest_pose() const { return rest_pose_; }
-    /// The level at which each vertex of the finest mesh comes in. Made when first asked for.
-    const std::vector<float>& arrival();
 
     /// Prepares a level unless it was asked for before. `upload` runs its argument with OpenGL at hand; `ready` is
     /// called when the level is there, or with the error that says why there will be none.
@@ -70,7 +69,6 @@ private:
     std::vector<std::unique_ptr<ShownLevel>> levels_;
     std::vector<char> asked_;
     std::vector<LevelFacts> facts_;
-    std::vector<float> arrival_;
     bool is_measured_ = false;
     std::shared_ptr<int> life_ = std::make_shared<int>(); ///< deliveries come only while it lives
 };

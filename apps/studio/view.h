@@ -1,7 +1,7 @@
 // How the window looks at the document: camera, style, what else is shown. Not part of what is saved or undone.
 #pragma once
 
-#include "filigree/render/camera.h"
+#include "filigree/render.h"
 #include "filigree/scene/dropped_body.h"
 
 #include <QObject>
@@ -11,18 +11,21 @@
 namespace filigree::studio {
 
 enum class SurfaceStyle { shaded, edges, wireframe };
-enum class Coloring { own, error, levels, patches, expected_error, pieces, heat };
-enum class Tool { pull, pin, turn, torch };
+
+struct Coloring;
+extern const Coloring kOwnColors;
+struct ToolEntry;
+extern const ToolEntry kPullTool;
 
 struct ViewSettings {
     SurfaceStyle style = SurfaceStyle::shaded;
-    Coloring coloring = Coloring::own;
-    Tool tool = Tool::pull;
-    bool split = false;         ///< driver | restored | full deformation
-    bool driver = false;        ///< the driver's edges over the mesh
-    bool defects = false;       ///< open and non-manifold edges marked
-    bool particles = false;     ///< the body's, instead of its surface
-    bool inside_points = false; ///< points inside the mesh at rest
+    const Coloring* coloring = &kOwnColors; ///< one of colorings()
+    const ToolEntry* tool = &kPullTool;     ///< one of kTools
+    bool split = false;                     ///< driver | restored | full deformation
+    bool driver = false;                    ///< the driver's edges over the mesh
+    bool defects = false;                   ///< open and non-manifold edges marked
+    bool particles = false;                 ///< the body's, instead of its surface
+    bool inside_points = false;             ///< points inside the mesh at rest
     std::size_t inside_count = 3000;
     double apart = 0; ///< of the pieces of a mesh that breaks: how far each is moved, times its way from the middle
     bool clip = false;

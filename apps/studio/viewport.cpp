@@ -55,7 +55,7 @@ struct Viewport::Impl {
     Impl(Workbench& bench, Viewport& view)
         : workbench(bench), widget(view), overlay(new Overlay(&view)),
           drawn(bench, [this](const std::function<void()>& work) { with_opengl(work); }), camera(bench, drawn, view),
-          pointer(bench, drawn, camera, view, [this](const QPointF& point) { return pick(point); }) {
+          pointer({bench, drawn, camera, [this](const QPointF& point) { return pick(point); }}, view) {
         clock.start();
     }
 

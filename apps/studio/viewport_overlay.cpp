@@ -1,5 +1,7 @@
 #include "viewport_overlay.h"
 
+#include "coloring.h"
+#include "pins.h"
 #include "words.h"
 
 #include <algorithm>
@@ -9,24 +11,6 @@ namespace filigree::studio {
 namespace {
 
 constexpr std::size_t kMostDefects = 5'000; // edges drawn
-
-/// "Bend 35°".
-QString gizmo_label(GizmoPart part, const Warps& warps) {
-    const auto factor = [](double value) { return QString::fromUtf8("× %1").arg(value, 0, 'f', 2); };
-    const auto degrees = [](double value) { return QString::fromUtf8("%1°").arg(value, 0, 'f', 0); };
-    switch (part) {
-    case GizmoPart::stretch:
-        return "Stretch " + factor(warps.stretch);
-    case GizmoPart::squeeze:
-        return "Squeeze " + factor(warps.squeeze);
-    case GizmoPart::bend:
-        return "Bend " + degrees(warps.bend);
-    case GizmoPart::twist:
-        return "Twist " + degrees(warps.twist);
-    default:
-        return "Taper " + factor(warps.taper);
-    }
-}
 
 class OverlayWriter {
 public:
@@ -42,8 +26,7 @@ public:
             add_captions();
             add_legend();
             add_pins();
-            add_hold();
-            add_knobs();
+            pointer_.draw(content);
             if (settings_.defects) add_defects();
         }
         add_note();
@@ -54,7 +37,6 @@ private:
     const LevelFacts& facts() const {
         return drawn_.shown()->facts()[std::min(drawn_level_, drawn_.shown()->finest_level())];
     }
-    QPointF place(const Vec3f& relative) const { return camera_.place_of(drawn_.origin() + relative.cast<double>()); }
 
     void add_triad() {
         const Mat3d basis = camera_.camera().basis();
@@ -81,56 +63,17 @@ private:
     }
 
     void add_legend() {
+        const LegendWords& words = settings_.coloring->legend;
         const VertexColors& colors = drawn_.colors();
-        if (colors.values.empty() || settings_.coloring == Coloring::pieces) return;
-        const bool is_levels = settings_.coloring == Coloring::levels;
-        if (settings_.coloring == Coloring::heat) {
-            content.legend = OverlayContent::Legend{"Temperature", "°C", colors.map, colors.range, 1.0, true};
-            return;
-        }
-        const char* const title = is_levels ? "Level at which a vertex comes in"
-                                  : settings_.coloring == Coloring::expected_error
-                                      ? "Expected error"
-                                      : "Distance from the full deformation";
-        content.legend = OverlayContent::Legend{
-            title, is_levels ? "" : "% of the diagonal", colors.map, colors.range, is_levels ? 1.0 : 100.0, is_levels};
+        if (words.title && !colors.values.empty())
+            content.legend =
+                OverlayContent::Legend{words.title, words.unit, colors.map, colors.range, words.per_value, words.whole};
     }
 
     void add_pins() {
-        if (workbench_.mode() != Mode::deform) return;
-        const std::vector<Vec3f>& driver = drawn_.pose().positions;
-        for (const Index vertex : pointer_.shown_pins())
-            if (vertex < driver.size()) content.pins.push_back(place(driver[vertex]));
-    }
-
-    /// The circle that a pull would take hold of, and the line from a body to the mouse that pulls it.
-    void add_hold() {
-        const PictureSize size = camera_.tile_size();
-        if (pointer_.hover() && !pointer_.is_dragging()) {
-            content.hover = pointer_.hover_at();
-            content.hover_radius =
-                std::clamp(pointer_.grip() * pixels_a_unit(camera_.camera(), pointer_.hover()->at, size), 5.0,
-                           0.4 * std::min(size.width, size.height));
-        }
-        const Picked* pulled = pointer_.pulled();
-        const std::optional<unsigned> level = drawn_.shown()->nearest_ready(drawn_level_);
-        if (!pulled || workbench_.mode() != Mode::body || !level) return;
-        const std::span<const Vec3f> positions = drawn_.positions(*level);
-        const std::optional<Index> vertex = drawn_.shown()->level(*level)->shape->vertex_of(pulled->vertex);
-        if (vertex && *vertex < positions.size()) content.pull = QLineF(place(positions[*vertex]), pointer_.place());
-    }
-
-    void add_knobs() {
-        for (const GizmoShape& shape : pointer_.gizmos()) {
-            OverlayContent::Knob knob;
-            knob.part = shape.part;
-            for (const Vec3d& point : shape.line) knob.line << camera_.place_of(point);
-            knob.at = camera_.place_of(shape.knob);
-            knob.has_tip = shape.has_tip;
-            knob.is_hot = pointer_.hot_part() == shape.part;
-            if (knob.is_hot) knob.label = gizmo_label(shape.part, workbench_.state().warps);
-            content.knobs.push_back(std::move(knob));
-        }
+        if (workbench_.mode() == Mode::deform)
+            content.pins = camera_.places_of(pinned_vertices(workbench_.state().handles), drawn_.pose().positions,
+                                             drawn_.origin());
     }
 
     void add_defects() {
@@ -143,7 +86,7 @@ private:
             if (finding->count > 0) found.push_back(with_commas(finding->count) + ' ' + name);
         content.defect_summary = found.empty() ? "No defects: the mesh is closed and manifold"
                                                : QStringList(found.begin(), found.end()).join('\n');
-        const std::vector<DefectEdge>& defects = drawn_.defects();
+        const std::span<const DefectEdge> defects = drawn_.defects();
         const std::span<const Vec3f> positions = drawn_.positions(drawn_.shown()->finest_level());
         if (defects.empty() || positions.empty()) return;
         const std::size_t step = (defects.size() + kMostDefects - 1) / kMostDefects;
@@ -170,15 +113,11 @@ private:
                 .arg(drawn_level_)
                 .arg(shown->finest_level())
                 .arg(with_commas(facts().vertices));
-        if (shown && settings_.coloring == Coloring::patches && !drawn_.patches_problem().empty())
-            return QString::fromStdString(drawn_.patches_problem());
-        if (shown && settings_.coloring == Coloring::expected_error && state.model->code() != DetailCode::blend)
-            return "The expected error is known for the blend code alone.";
-        if (shown && settings_.coloring == Coloring::heat && drawn_.colors().values.empty())
-            return "Heat is known of a body that melts while it moves: choose wax or ice in the Body panel.";
+        const auto why_no_colors = settings_.coloring->why_not;
+        if (const QString why = shown && why_no_colors ? why_no_colors(drawn_.seen()) : QString(); !why.isEmpty())
+            return why;
         if (!state.source) return {};
-        if (!(pointer_.rest_box().diagonal() > 0))
-            return "All vertices are in one place, so there is no shape to show.";
+        if (!(state.source->box.diagonal() > 0)) return "All vertices are in one place, so there is no shape to show.";
         if (state.source->mesh.face_count() == 0) return "This mesh has no faces: its vertices are shown as balls.";
         return {};
     }

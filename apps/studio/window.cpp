@@ -4,6 +4,7 @@
 #include "icons.h"
 #include "message_bar.h"
 #include "panels/panels.h"
+#include "tools/tool.h"
 #include "words.h"
 
 #include <QApplication>
@@ -90,18 +91,23 @@ struct MainWindow::Impl {
         bar->setMovable(false);
         bar->setFloatable(false);
         bar->setIconSize(QSize(20, 20));
-        for (const char* name :
-             {"tool.pull", "tool.pin", "tool.turn", "tool.torch", "", "view.show_all", "", "edit.undo", "edit.redo"}) {
-            if (*name)
-                bar->addAction(actions->find(name));
-            else
+        QStringList names;
+        for (const ToolEntry* const tool : kTools) names << QStringLiteral("tool.") + tool->name;
+        for (const QString& name : names << ""
+                                         << "view.show_all"
+                                         << ""
+                                         << "edit.undo"
+                                         << "edit.redo") {
+            QAction* const action = actions->find(name);
+            if (!action) {
                 bar->addSeparator();
-            if (auto* button =
-                    *name ? qobject_cast<QToolButton*>(bar->widgetForAction(actions->find(name))) : nullptr) {
-                button->setObjectName(QStringLiteral("toolbar.") + name);
-                button->setFocusPolicy(Qt::TabFocus);
-                button->setAccessibleName(actions->find(name)->text().remove('&'));
+                continue;
             }
+            bar->addAction(action);
+            auto* button = qobject_cast<QToolButton*>(bar->widgetForAction(action));
+            button->setObjectName("toolbar." + name);
+            button->setFocusPolicy(Qt::TabFocus);
+            button->setAccessibleName(action->text().remove('&'));
         }
         window.addToolBar(Qt::LeftToolBarArea, bar);
     }

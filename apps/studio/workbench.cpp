@@ -1,9 +1,11 @@
 #include "workbench_impl.h"
 
+#include "coloring.h"
+
 #include "filigree/deform/restored_error.h"
 
-#include "filigree/physics/named_materials.h"
-#include "filigree/sample/spacing_for_count.h"
+#include "filigree/physics/material.h"
+#include "filigree/sample.h"
 
 #include <QCoreApplication>
 #include <QEventLoop>
@@ -37,17 +39,17 @@ Workbench::Workbench(State start) : impl_(std::make_unique<Impl>()) {
     connect(&document_, &Document::changed, this, &Workbench::follow_document);
     connect(&playback_, &Playback::moved, this, &Workbench::follow_playback);
     connect(&playback_, &Playback::state_changed, this, [this] {
-        if (!playback_.has_body()) {
-            impl_->measures_next = impl_->commits_steps = false;
-            if (impl_->pulls_body) is_pulling_ = false;
-        }
-        if (mode_ == Mode::body && frame_count() == 0 && !impl_->keeps_body) set_mode(Mode::deform);
+        if (!playback_.has_body()) impl_->measured_pose = 0;
+        if (mode_ == Mode::body && frame_count() == 0) set_mode(Mode::deform);
         Q_EMIT timeline_changed();
+    });
+    connect(&playback_, &Playback::stepped, this, [this] {
+        if (!playback_.is_playing()) commit_recording("Simulate step by step", "step");
     });
     const auto tell = [this](const Error& error) { Q_EMIT told(QString::fromStdString(error.message), true); };
     connect(&playback_, &Playback::failed, this, tell);
     connect(&playback_, &Playback::failed, this, [this] {
-        impl_->measures_next = false;
+        impl_->measured_pose = 0;
         commit_recording(); // what there was before
     });
     connect(&jobs_, &Jobs::failed, this, tell);
@@ -62,7 +64,6 @@ Workbench::Workbench(State start) : impl_(std::make_unique<Impl>()) {
     });
     connect(&drag_, &HandleDrag::solved, this, &Workbench::show_drag);
     connect(&drag_, &HandleDrag::failed, this, [this, tell](const Error& error) {
-        is_pulling_ = false;
         show_pose();
         tell(error);
     });
@@ -82,7 +83,8 @@ void Workbench::follow_document(const State& before) {
         now.model == before.model && now.recording == before.recording && is_same_body(now.body, before.body);
     if (now.body.air_temperature != before.body.air_temperature)
         playback_.set_air_temperature(now.body.air_temperature);
-    if (!is_same_motion && !impl_->keeps_body) {
+    const bool keeps_motion = is_same_motion || is_of_body(now);
+    if (!keeps_motion) {
         impl_->replay.stop();
         playback_.remove();
     }
@@ -91,27 +93,29 @@ void Workbench::follow_document(const State& before) {
         jobs_.drop(kSourceTopic); // of the mesh before
     }
     if (now.model != before.model) jobs_.drop(kModelTopic); // what is being made was meant for the one before
-    if (is_pulling_ && drag_.is_active()) {
-        drag_.stop(); // something else has changed meanwhile, an undo say
-        is_pulling_ = false;
-    }
+    drag_.stop();                                           // something else has changed meanwhile, an undo say
     if (!is_same_motion) frame_ = std::min(frame_, frame_count() > 0 ? frame_count() - 1 : 0);
-    if (mode_ == Mode::body && frame_count() == 0 && !impl_->keeps_body) {
+    const bool leaves_body = mode_ == Mode::body && frame_count() == 0;
+    if (leaves_body) {
         mode_ = Mode::deform;
         Q_EMIT mode_changed();
     }
-    const bool is_same_shape = now.model == before.model && now.warps == before.warps &&
+    const bool is_same_shape = !leaves_body && now.model == before.model && now.warps == before.warps &&
                                now.handle_pose == before.handle_pose &&
-                               (mode_ == Mode::deform || now.recording == before.recording || impl_->keeps_body);
+                               (mode_ == Mode::deform || now.recording == before.recording || keeps_motion);
     if (!is_same_shape || now.restore != before.restore) show_pose();
     if (!is_same_motion) Q_EMIT timeline_changed();
     if (now.model != before.model && std::exchange(impl_->fits_driver, std::nullopt) == now.strip) make_body();
-    if (impl_->is_opening || (now.source != before.source && impl_->is_another_shape)) Q_EMIT opened();
+}
+
+bool Workbench::is_of_body(const State& state) const {
+    const auto& of = impl_->body_of;
+    return playback_.has_body() && state.model == of.model && state.recording == of.recording &&
+           is_same_body(state.body, of.settings);
 }
 
 void Workbench::show_pose() {
     const auto begin = std::chrono::steady_clock::now();
-    if (std::exchange(impl_->measures_next, false) && !wants_full_) want_every_vertex(false);
     pose_ = {};
     if (mode_ == Mode::deform) {
         pose_ = deformed_pose(state(), impl_->context);
@@ -132,7 +136,9 @@ void Workbench::show_pose() {
 bool Workbench::is_apart() const { return mode_ == Mode::deform && impl_->shown_apart > 0 && state().source->pieces; }
 
 void Workbench::pose_is_new() {
+    const bool was_to_measure = is_to_measure();
     ++impl_->pose_number;
+    if (was_to_measure && !wants_full_) ask_for_every_vertex(); // no more
     error_.reset();
     full_.clear();
     forget_measuring();
@@ -151,7 +157,7 @@ void Workbench::find_full() {
         if (is_live_frame()) full_ = playback_.moment()->full;
         return full_is_new();
     }
-    if (is_pulling_ || is_apart() || state().pose_from_file ||
+    if (is_pulling() || is_apart() || state().pose_from_file ||
         (state().handle_pose && state().model->vertex_count() > kMostPulledUnasked))
         return;
     const std::uint64_t number = impl_->pose_number;
@@ -167,23 +173,28 @@ void Workbench::find_full() {
 
 void Workbench::full_is_new() {
     Q_EMIT full_changed();
-    if (!full_.empty() && view_.settings().coloring == Coloring::error && !is_playing()) measure_error();
+    if (!full_.empty() && view_.settings().coloring == &kErrorColors && !is_playing()) measure_error();
 }
 
 void Workbench::want_full(bool wanted) {
     if (wants_full_ == wanted) return;
     wants_full_ = wanted;
-    want_every_vertex(wanted);
+    ask_for_every_vertex();
     if (wanted)
         find_full();
     else
         full_.clear();
 }
 
-void Workbench::want_every_vertex(bool wanted) {
+/// Each moment of the body tells every vertex while somebody needs them, the last one once more.
+void Workbench::ask_for_every_vertex() {
     MomentWishes wishes = playback_.wishes();
-    wishes.full = wanted;
+    wishes.full = wants_full_ || is_to_measure();
     playback_.want(wishes);
+}
+
+bool Workbench::is_to_measure() const {
+    return impl_->measured_pose != 0 && impl_->measured_pose == impl_->pose_number;
 }
 
 void Workbench::measure_error() {
@@ -196,8 +207,8 @@ void Workbench::measure_error() {
             return Q_EMIT told("The error of a recorded moment is only known while its body is there: press Play, then "
                                "pause.",
                                false);
-        impl_->measures_next = true;
-        return want_every_vertex(true); // another look at this moment, with every vertex
+        impl_->measured_pose = impl_->pose_number;
+        return ask_for_every_vertex();
     }
     if (is_apart())
         return Q_EMIT told("Pieces that are shown apart have no error: set Apart to 0 in the Fracture panel.", false);
@@ -253,7 +264,7 @@ void Workbench::sample_inside_points(std::size_t count) {
 void Workbench::wait_until_idle() {
     jobs_.wait_until_idle();
     const auto is_judging = [&] { return expected_error_.is_pending() && !is_playing(); };
-    while (impl_->measures_next || jobs_.is_busy() || drag_.is_busy() || is_judging())
+    while (is_to_measure() || jobs_.is_busy() || drag_.is_busy() || is_judging())
         QCoreApplication::processEvents(QEventLoop::WaitForMoreEvents);
 }
 

@@ -74,8 +74,6 @@ public:
     void set_level(unsigned level, const std::string& merge = {});
     void remove_detail(); ///< one level coarser
     void add_detail();    ///< one level finer
-    void set_law(std::optional<HeightLaw> law);
-    void set_thin_shell(bool thin);
     // Deform
     void set_warps(const Warps& wanted, const std::string& merge = {});
     void reset_deformation(); ///< warps and handles
@@ -88,7 +86,7 @@ public:
     void pull_to(const Vec3d& target);
     void end_pull();
     void cancel_pull(); ///< the shape is what it was before; a body is let go
-    bool is_pulling() const { return is_pulling_; }
+    bool is_pulling() const { return drag_.is_active() || playback_.is_grabbed(); }
     // Body
     void set_body(const BodySettings& settings, const std::string& merge = {}); ///< a body that was made is made again
     void make_body();
@@ -168,7 +166,9 @@ private:
     bool is_apart() const; ///< pieces are shown apart
     void pose_is_new();
     void find_full();
-    void want_every_vertex(bool wanted); ///< with each moment of the body
+    void ask_for_every_vertex();
+    bool is_to_measure() const; ///< the error of the pose shown, once every vertex of it is delivered
+    bool is_of_body(const State& state) const;
     void forget_measuring();
     void full_is_new();
     void show_drag(const std::shared_ptr<const Pose>& pose, double milliseconds);
@@ -201,7 +201,7 @@ private:
     std::vector<Vec3f> full_, inside_points_;
     std::optional<VertexDistance> error_;
     double driver_milliseconds_ = 0;
-    bool is_pulling_ = false, wants_full_ = false;
+    bool wants_full_ = false;
     std::size_t frame_ = 0;
     std::unique_ptr<Impl> impl_;
     ExpectedError expected_error_{*this};

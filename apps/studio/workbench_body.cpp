@@ -30,7 +30,7 @@ void Workbench::set_body(const BodySettings& settings, const std::string& merge)
             name_of_change(state().body, settings), [&](State& next) { next.body = settings; }, merge);
     const bool had_body = playback_.has_body(), was_playing = is_playing();
     if (had_body) pause();
-    impl_->keeps_body = had_body; // until the new one is there
+    if (had_body) impl_->body_of = {state().model, settings, nullptr}; // it stays until the new one is there
     document_.edit(
         name_of_change(state().body, settings),
         [&](State& next) {
@@ -38,7 +38,6 @@ void Workbench::set_body(const BodySettings& settings, const std::string& merge)
             if (had_body) next.recording = nullptr; // of another body
         },
         merge);
-    impl_->keeps_body = false;
     if (had_body)
         make_body_then(was_playing ? After::play : After::nothing);
     else if (jobs_.is_pending(kBodyTopic))
@@ -139,13 +138,12 @@ void Workbench::make_body_then(After then) {
 void Workbench::put_body(std::shared_ptr<const DroppedBody> made) {
     const After then = std::exchange(impl_->then, After::nothing);
     impl_->replay.stop();
-    impl_->keeps_body = true;
-    document_.edit("Make a body", [](State& next) { next.recording = nullptr; });
     const QString warned = std::exchange(impl_->body_warning, warning_of(*made));
     if (!warned.isEmpty() && warned != impl_->body_warning) Q_EMIT withdrawn(warned);
-    playback_.put(made);
-    impl_->keeps_body = false;
     frame_ = 0;
+    impl_->body_of = {state().model, state().body, nullptr};
+    playback_.put(made);
+    document_.edit("Make a body", [](State& next) { next.recording = nullptr; });
     set_mode(Mode::body);
     show_pose();
     Q_EMIT timeline_changed();
@@ -159,7 +157,7 @@ void Workbench::put_body(std::shared_ptr<const DroppedBody> made) {
 
 void Workbench::set_mode(Mode mode) {
     if (mode == mode_) return;
-    if (is_pulling_) end_pull();
+    if (is_pulling()) end_pull();
     if (mode == Mode::deform) pause();
     mode_ = mode;
     Q_EMIT mode_changed();
@@ -217,7 +215,6 @@ void Workbench::pause() {
     const bool was_playing = is_playing();
     impl_->replay.stop();
     playback_.pause();
-    if (is_pulling_ && impl_->pulls_body) is_pulling_ = false;
     commit_recording();
     if (was_playing) Q_EMIT timeline_changed();
     if (was_playing && wants_full_ && is_live_frame()) full_is_new();
@@ -229,20 +226,17 @@ void Workbench::step() {
     set_mode(Mode::body);
     if (frame_ + 1 < frame_count()) return go_to_frame(frame_ + 1);
     if (!playback_.has_body()) return;
-    impl_->commits_steps = true;
     playback_.step();
 }
 
 void Workbench::reset() {
     impl_->replay.stop();
     playback_.pause();
-    if (is_pulling_ && impl_->pulls_body) is_pulling_ = false;
     commit_recording();
     frame_ = 0;
-    impl_->keeps_body = true;
+    impl_->body_of.recording = nullptr;
     playback_.reset();
     document_.edit("Reset the body", [](State& next) { next.recording = nullptr; });
-    impl_->keeps_body = false;
     if (mode_ == Mode::body && frame_count() == 0) return set_mode(Mode::deform);
     if (mode_ == Mode::body) show_pose();
     Q_EMIT timeline_changed();
@@ -287,7 +281,7 @@ void Workbench::show_last_frame() {
 void Workbench::follow_playback() {
     const Moment& moment = *playback_.moment();
     const bool is_another = std::exchange(impl_->looked_at, moment.frame) != moment.frame;
-    if (mode_ != Mode::body || impl_->keeps_body) return;
+    if (mode_ != Mode::body) return;
     if (!is_another && frame_ != moment.frame) return; // looked at once more, for its vertices, and not shown
     frame_ = std::min(moment.frame, frame_count() - 1);
     if (is_another || pose_.positions != moment.pose.positions || pose_.gradients != moment.pose.gradients) {
@@ -299,14 +293,10 @@ void Workbench::follow_playback() {
         full_ = moment.full;
         full_is_new();
     }
-    if (impl_->measures_next && !moment.full.empty()) {
-        impl_->measures_next = false;
-        if (!wants_full_) want_every_vertex(false);
+    if (is_to_measure() && !moment.full.empty()) {
+        impl_->measured_pose = 0;
+        if (!wants_full_) ask_for_every_vertex(); // no more
         measure_error();
-    }
-    if (impl_->commits_steps && !playback_.is_playing() && !playback_.is_stepping()) {
-        impl_->commits_steps = false;
-        commit_recording("Simulate step by step", "step");
     }
 }
 
@@ -319,13 +309,11 @@ void Workbench::commit_recording(const QString& name, const std::string& merge) 
         state().recording ? std::make_shared<Recording>(*state().recording) : std::make_shared<Recording>();
     recording->follow(playback_.recording(), playback_.surfaces());
     State next = state();
-    next.recording = std::move(recording);
-    impl_->keeps_body = true;
+    next.recording = impl_->body_of.recording = std::move(recording);
     if (name.isEmpty()) // play and pause over and over are one step
         document_.change("Simulate " + counted(count - 1, "frame", "frames"), std::move(next), "play");
     else
         document_.change(name, std::move(next), merge);
-    impl_->keeps_body = false;
 }
 
 } // namespace filigree::studio

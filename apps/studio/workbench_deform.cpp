@@ -61,7 +61,7 @@ void Workbench::unpin(std::span<const Index> driver_vertices) {
 void Workbench::unpin_all() { unpin(pinned_vertices(state().handles)); }
 
 void Workbench::begin_pull(Index vertex, const Vec3d& at) {
-    if (is_pulling_) end_pull();
+    if (is_pulling()) end_pull();
     const Mesh& mesh = state().model->mesh;
     if (vertex >= mesh.vertex_count() || !at.allFinite()) return;
     const Vec3f rest = mesh.positions[vertex];
@@ -69,8 +69,6 @@ void Workbench::begin_pull(Index vertex, const Vec3d& at) {
         if (!playback_.has_body()) return Q_EMIT told("A recording cannot be pulled: make the body first.", false);
         impl_->replay.stop();
         show_last_frame();
-        is_pulling_ = true;
-        impl_->pulls_body = true;
         return playback_.grab(rest, at - mesh.origin);
     }
     if (state().source->pieces)
@@ -88,14 +86,12 @@ void Workbench::begin_pull(Index vertex, const Vec3d& at) {
     impl_->warp = make_warp(state().warps, world_bounds(mesh));
     impl_->grabbed = impl_->warp ? unwarped(*impl_->warp, at, mesh.world_position(vertex)) : at;
     impl_->pull = pull;
-    impl_->pulls_body = false;
-    is_pulling_ = true;
     drag_.begin(state().model, state().handle_pose, std::move(pull), vertex);
 }
 
 void Workbench::pull_to(const Vec3d& target) {
-    if (!is_pulling_ || !target.allFinite()) return;
-    if (impl_->pulls_body) return playback_.pull(target - state().model->mesh.origin);
+    if (!is_pulling() || !target.allFinite()) return;
+    if (playback_.is_grabbed()) return playback_.pull(target - state().model->mesh.origin);
     const Vec3d place =
         impl_->warp ? unwarped(*impl_->warp, target, impl_->grabbed + impl_->pull.move.cast<double>()) : target;
     impl_->pull.move = (place - impl_->grabbed).cast<float>();
@@ -104,7 +100,7 @@ void Workbench::pull_to(const Vec3d& target) {
 
 /// The driver as it is dragged, before it becomes a step.
 void Workbench::show_drag(const std::shared_ptr<const Pose>& pose, double milliseconds) {
-    if (!is_pulling_ || mode_ != Mode::deform) return;
+    if (mode_ != Mode::deform) return;
     const auto begin = std::chrono::steady_clock::now();
     State dragged = state();
     dragged.handle_pose = pose;
@@ -114,13 +110,11 @@ void Workbench::show_drag(const std::shared_ptr<const Pose>& pose, double millis
 }
 
 void Workbench::end_pull() {
-    if (!is_pulling_) return;
-    if (impl_->pulls_body) {
-        is_pulling_ = false;
-        return playback_.let_go();
-    }
-    std::shared_ptr<const Pose> pose = drag_.finish();
-    if (!std::exchange(is_pulling_, false)) return; // it failed, and that was told
+    if (playback_.is_grabbed()) return playback_.let_go();
+    if (!drag_.is_active()) return;
+    Result<std::shared_ptr<const Pose>> finished = drag_.finish();
+    if (!finished) return; // it failed, and that was told
+    std::shared_ptr<const Pose> pose = std::move(finished).value();
     if (!pose) Q_EMIT told("The driver is large: hold it until it follows, then let go.", false);
     Handle& pull = impl_->pull;
     if (!pose || pull.move.isZero(0)) return show_pose();
@@ -133,10 +127,9 @@ void Workbench::end_pull() {
 }
 
 void Workbench::cancel_pull() {
-    if (!is_pulling_) return;
-    if (impl_->pulls_body) return end_pull();
+    if (playback_.is_grabbed()) return end_pull();
+    if (!drag_.is_active()) return;
     drag_.stop();
-    is_pulling_ = false;
     show_pose();
 }
 

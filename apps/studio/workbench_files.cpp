@@ -40,13 +40,8 @@ Result<State> read_state(const std::string& path, const RunContext& context) {
         if (!model) return model.error();
         Result<PoseSequence> poses = read_poses(*bytes, path, context);
         if (!poses) return poses.error();
-        state.strip.code = model->code();
-        if (const auto* blend = std::get_if<BlendDetail>(&model->detail)) {
-            state.strip.base = model->driver().vertices.size();
-            state.strip.precision = blend->precision;
-        }
-        if (const auto* reference = std::get_if<ReferenceDetail>(&model->detail))
-            state.strip.references = reference->references;
+        state.strip.base = model->driver().vertices.size();
+        state.strip.precision = model->detail.precision;
         state.model = std::make_shared<const Model>(std::move(*model));
         if (poses->frames.size() == 1) { // a shape, not a motion
             state.handle_pose = std::make_shared<const Pose>(std::move(poses->frames[0]));
@@ -167,11 +162,12 @@ Result<QString> write_frames(const State& state, const Recording& poses, const N
     if (!restorer) return restorer.error();
     RunContext quiet = context; // the progress is that of the frames
     quiet.progress = nullptr;
-    const NumberedMeshes meshes{name, [&](std::size_t frame) -> Result<Mesh> {
-                                    if (const auto surface = poses.surface(frame)) return *surface;
-                                    return restorer->mesh(*poses.frames[frame], quiet);
-                                }};
-    const auto warnings = write_numbered_meshes(poses.frames.size(), std::span(&meshes, 1), context);
+    const auto mesh = [&](std::size_t frame) -> Result<Mesh> {
+        if (const auto surface = poses.surface(frame)) return *surface;
+        return restorer->mesh(*poses.frames[frame], quiet);
+    };
+    const NumberedMeshes meshes{name, {poses.frames.size(), poses.frames_per_second, mesh}};
+    const auto warnings = write_numbered_meshes(std::span(&meshes, 1), context);
     if (!warnings) return warnings.error();
     QString text = QString("Saved %1 to %2.")
                        .arg(counted(poses.frames.size(), "mesh", "meshes"), file_name(name.file(1).string()));
@@ -222,7 +218,7 @@ void Workbench::open_whole(const std::string& path, std::shared_ptr<const Source
             return state;
         },
         [this, path, look, id = document_.state_id()](State state) {
-            if (is_pulling_) end_pull();
+            if (is_pulling()) end_pull();
             pause();
             const State& now = this->state();
             const bool is_warped_look = look && now.source == look && now.handles.empty() && !now.recording;
@@ -243,12 +239,11 @@ void Workbench::open_whole(const std::string& path, std::shared_ptr<const Source
 }
 
 void Workbench::replace_document(State state) {
-    if (is_pulling_) end_pull();
+    if (is_pulling()) end_pull();
     pause();
     frame_ = 0;
-    impl_->is_opening = true;
     document_.replace(std::move(state));
-    impl_->is_opening = false;
+    Q_EMIT opened();
 }
 
 void Workbench::save(const QString& title, const std::string& path,
@@ -266,12 +261,7 @@ void Workbench::save(const QString& title, const std::string& path,
         });
 }
 
-std::vector<QString> Workbench::left_out_of_model() const {
-    std::vector<QString> result = lost_with_model(state());
-    if (state().restore.law) result.push_back("the law");
-    if (state().restore.thin_shell) result.push_back("thin shell");
-    return result;
-}
+std::vector<QString> Workbench::left_out_of_model() const { return lost_with_model(state()); }
 
 void Workbench::save_model(const std::string& path) {
     commit_recording();
@@ -356,7 +346,7 @@ void Workbench::export_film(const std::string& path, const FilmSettings& setting
         if (!frames) return frames.error();
         QString text = QString("Saved %1: %2.").arg(file_name(path), counted(*frames, "picture", "pictures"));
         std::vector<QString> left_out;
-        if (view.coloring != Coloring::own) left_out.push_back("colouring");
+        if (view.coloring != &kOwnColors) left_out.push_back("colouring");
         if (view.clip) left_out.push_back("the clip plane");
         if (view.split) left_out.push_back("the split view");
         if (view.particles || view.inside_points) left_out.push_back("points");

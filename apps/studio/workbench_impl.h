@@ -26,7 +26,6 @@ struct Workbench::Impl {
     std::unique_ptr<SpaceWarp> warp;
     Vec3d grabbed = Vec3d::Zero();
     Handle pull;
-    bool pulls_body = false;
 
     // What make_shape() and set_strip() asked for last, while it is being made.
     std::optional<Shape> wanted_shape;
@@ -43,10 +42,13 @@ struct Workbench::Impl {
     bool told_of_torch = false;  ///< that it does nothing here
     QString body_warning;
     std::optional<StripOptions> fits_driver; ///< once a model is made with these, a body is
-    bool keeps_body = false;                 ///< a step of our own, after which the body still fits
-    bool commits_steps = false;              ///< once they are delivered
-    bool measures_next = false;              ///< the error, once every vertex is delivered
-    bool is_opening = false, is_another_shape = false;
+    /// The document that the body there belongs to: it goes when model, body or recording become others.
+    struct {
+        std::shared_ptr<const Model> model;
+        BodySettings settings;
+        std::shared_ptr<const Recording> recording;
+    } body_of;
+    std::uint64_t measured_pose = 0; ///< whose error is measured once every vertex of it is delivered; 0: none
 };
 
 } // namespace filigree::studio

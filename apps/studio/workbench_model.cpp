@@ -93,12 +93,12 @@ void Workbench::make_model(const QString& title, std::optional<Shape> shape, con
             const Shape before = now.shape.value_or(Shape{.name = "", .options = {}});
             const QString name =
                 is_new_shape ? name_of_change(before, *made.shape) : name_of_change(now.strip, made.strip);
-            impl_->is_another_shape = is_new_shape && before.name != made.shape->name;
+            const bool is_another_shape = is_new_shape && before.name != made.shape->name;
             now.source = made.source;
             now.shape = made.shape;
             take_model(now, made);
             document_.change(name, std::move(now), key);
-            impl_->is_another_shape = false;
+            if (is_another_shape) Q_EMIT opened();
         });
 }
 
@@ -125,15 +125,6 @@ void Workbench::remove_detail() {
 }
 void Workbench::add_detail() { change_level(state().level() + 1, "Add detail", {}); }
 
-void Workbench::set_law(std::optional<HeightLaw> law) {
-    const std::string name(law ? height_law_name(*law) : "as usual");
-    document_.edit("Law: " + QString::fromStdString(name), [&](State& next) { next.restore.law = law; });
-}
-
-void Workbench::set_thin_shell(bool thin) {
-    document_.edit(thin ? "Thin shell" : "Solid", [&](State& next) { next.restore.thin_shell = thin; });
-}
-
 const QuadRemeshOptions& Workbench::quad_options() const { return impl_->quad_options; }
 
 void Workbench::set_quad_options(const QuadRemeshOptions& options) {
@@ -154,7 +145,7 @@ void Workbench::change_source(const QString& title, const QString& name,
         title, kSourceTopic,
         [before = state(), make = std::move(make)](const RunContext& context) { return make(before, context); },
         [this, name, then = std::move(then)](const State& made) {
-            if (is_pulling_) end_pull();
+            if (is_pulling()) end_pull();
             State now = state(); // warps and settings may have changed meanwhile
             now.source = made.source;
             now.shape = made.shape;

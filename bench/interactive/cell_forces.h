@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/physics/body.h"
+#include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/fem/cell_kernel.h"
 
 #include <random>

@@ -27,7 +27,7 @@ using MoveVertex = std::function<Vec3d(const std::array<Vec3d, 3>& rest, const s
 
 std::vector<Vec3f> move_with_cells(const Model& model, const Pose& pose, const MoveVertex& move,
                                    const RunContext& context) {
-    const BlendDetail& detail = std::get<BlendDetail>(model.detail);
+    const BlendDetail& detail = model.detail;
     const std::vector<Vec3f> rest = driver_positions(model);
     std::vector<Vec3f> out(model.mesh.vertex_count());
     parallel_for(context, detail.cells.size(), 64, [&](std::size_t begin, std::size_t end) {
@@ -100,17 +100,12 @@ std::vector<Vec3f> wrap_positions(const Model& model, const Pose& pose, const Ru
     return move_with_cells(model, pose, move_wrap, context);
 }
 
-std::vector<FidelityRow> measure_fidelity(const Model& model, const Model* reference, const RunContext& context) {
+std::vector<FidelityRow> measure_fidelity(const Model& model, const ReferenceModel* reference,
+                                          const RunContext& context) {
     std::vector<FidelityRow> rows;
     const Box box = world_bounds(model.mesh);
     const Result<Restorer> restorer = Restorer::create(model, {}, context);
     if (!restorer) return rows;
-    std::optional<Restorer> reference_restorer;
-    if (reference) {
-        Result<Restorer> created = Restorer::create(*reference, {}, context);
-        if (!created) return rows;
-        reference_restorer = *std::move(created);
-    }
 
     for (const NamedWarp& warp : fidelity_warps(box)) {
         if (context.is_cancelled()) return rows;
@@ -118,14 +113,15 @@ std::vector<FidelityRow> measure_fidelity(const Model& model, const Model* refer
         const Pose pose = warp_pose(*warp.warp, model, context);
         comparison.add("wrap", wrap_positions(model, pose, context));
         comparison.add("skinning", move_with_cells(model, pose, move_skinning, context));
-        if (reference_restorer)
-            comparison.add("reference",
-                           reference_restorer->positions(warp_pose(*warp.warp, *reference, context), context));
-        const Pose positions_only{pose.positions, {}, {}};
+        if (reference) {
+            const std::vector<Vec3f> driver =
+                warp_positions(*warp.warp, driver_positions(*reference), reference->mesh.origin, context);
+            Result<Mesh> restored = restore_reference(*reference, driver, {}, context);
+            if (!restored) return rows;
+            comparison.add("reference", std::move(restored->positions));
+        }
+        const Pose positions_only{pose.positions, {}};
         comparison.add("blend_positions", restorer->positions(positions_only, context));
-        const Pose with_ghosts{
-            pose.positions, {}, warp_positions(*warp.warp, restorer->rest_ghosts(), model.mesh.origin, context)};
-        comparison.add("blend_ghosts", restorer->positions(with_ghosts, context));
         comparison.add("blend_gradients", restorer->positions(pose, context));
     }
     return rows;

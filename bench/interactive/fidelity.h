@@ -3,6 +3,7 @@
 
 #include "filigree/hierarchy/model.h"
 #include "filigree/hierarchy/pose.h"
+#include "filigree/reference/reference_model.h"
 
 #include <string>
 #include <vector>
@@ -11,7 +12,7 @@ namespace filigree::bench {
 
 /// One method under one warp, against warping every vertex.
 struct FidelityRow {
-    std::string method; ///< wrap, skinning, reference, blend_positions, blend_ghosts or blend_gradients
+    std::string method; ///< wrap, skinning, reference, blend_positions or blend_gradients
     std::string warp;
     bool affine = false;
     double rms = 0, max = 0;   ///< fractions of the deformed mesh's diagonal
@@ -24,9 +25,10 @@ struct FidelitySummary {
     double affine_rms = 0, curved_rms = 0, curved_normal_p95_deg = 0;
 };
 
-/// model: a blend model; reference: null, or a reference model of the same mesh. The warps are those of
+/// reference: null, or a model of the same mesh by the report's method. The warps are those of
 /// docs/benchmarks.md, along the longest side of the box. When cancelled, the rows so far.
-std::vector<FidelityRow> measure_fidelity(const Model& model, const Model* reference, const RunContext& context);
+std::vector<FidelityRow> measure_fidelity(const Model& model, const ReferenceModel* reference,
+                                          const RunContext& context);
 /// What a wrap deformer makes of a blend model's driver: each vertex carried along in the frame of its cell.
 std::vector<Vec3f> wrap_positions(const Model& model, const Pose& pose, const RunContext& context);
 std::vector<FidelitySummary> summarise(const std::vector<FidelityRow>& rows);

@@ -168,10 +168,9 @@ public:
     void fidelity() {
         const Model& model = blend_model(Precision::float32);
         Mesh copy = mesh_;
-        const Result<Stripped> reference =
-            strip(std::move(copy), {.code = DetailCode::reference, .base = model.driver().vertices.size()}, context_);
-        const std::vector<FidelityRow> rows =
-            measure_fidelity(model, reference ? &reference->model : nullptr, context_);
+        const Result<ReferenceModel> reference =
+            strip_to_reference(std::move(copy), {.base = model.driver().vertices.size()}, context_);
+        const std::vector<FidelityRow> rows = measure_fidelity(model, reference ? &*reference : nullptr, context_);
         Table table{"fidelity", {"method", "warp", "rms", "max", "normal_p95_deg"}, {}};
         for (const FidelityRow& row : rows)
             table.rows.push_back({row.method, row.warp, row.rms, row.max, row.normal_p95_deg});
@@ -216,7 +215,7 @@ private:
 
     void restore_blend(Precision precision, double triad) {
         const Model& model = blend_model(precision);
-        const auto& detail = std::get<BlendDetail>(model.detail);
+        const auto& detail = model.detail;
         std::vector<BlendRestorer::Item> items(mesh_.vertex_count());
         for (Index v = 0; v < items.size(); ++v) items[v] = {v, v};
         const std::vector<Vec3f> normals(items.size(), Vec3f::UnitZ());
@@ -248,10 +247,10 @@ private:
 
     void restore_reference(double triad) {
         const unsigned resolution = 512;
-        const Stripped stripped =
-            strip(make_wavy_cube({.resolution = resolution}), {.code = DetailCode::reference}, context_).value();
-        const auto& detail = std::get<ReferenceDetail>(stripped.model.detail);
-        const std::vector<Vec3f> driver = driver_positions(stripped.model);
+        const ReferenceModel model =
+            strip_to_reference(make_wavy_cube({.resolution = resolution}), {}, context_).value();
+        const ReferenceDetail& detail = model.detail;
+        const std::vector<Vec3f> driver = driver_positions(model);
         for (const HeightLaw law : {HeightLaw::inverse, HeightLaw::keep}) {
             const ReferenceRestorer restorer(detail, law, context_);
             std::vector<Vec3f> positions(6 * std::size_t(resolution + 1) * (resolution + 1));

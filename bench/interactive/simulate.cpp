@@ -2,6 +2,7 @@
 
 #include "../heap.h"
 #include "cell_forces.h"
+#include "filigree/physics/body/make_cells.h"
 #include "timing.h"
 
 #include "filigree/hierarchy/restore.h"

@@ -1,13 +1,11 @@
 #!/usr/bin/env python3
-"""Restores a shot, draws a film's pictures, makes a sweep or strips a mesh on the workers of a Dask cluster, a chunk a
-task.
+"""Restores a shot, draws a film's pictures or makes a sweep on the workers of a Dask cluster, a chunk a task.
 
 A worker that is lost has its chunk run again by another one; a chunk that ran twice wrote the same bytes.
 
 Usage: dask_chunks.py SCHEDULER CHUNKS restore MODEL.fil --poses POSES -o SHOT.pc2
        dask_chunks.py SCHEDULER CHUNKS render MODEL.fil --poses POSES... -o frame_%04d.png
        dask_chunks.py SCHEDULER CHUNKS sweep SCENE.toml --set body.young_modulus=1e4,1e5 -o TABLE.csv
-       dask_chunks.py SCHEDULER CHUNKS strip MESH.ply -o MODEL.fil
 SCHEDULER: tcp://host:8786, as `dask-scheduler` prints it. The paths are those that the workers see.
 """
 import os

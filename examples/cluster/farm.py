@@ -1,25 +1,17 @@
 #!/usr/bin/env python3
-"""How long a job takes on a farm: simulates its graph of tasks, with machines that share one storage.
+"""How long a shot takes on a farm: simulates its tasks, with machines that share one storage.
 
 A task reads, computes, and writes. What machines move at one time shares the storage's rate evenly, each at most its
-own network's. Some tasks are killed half way and run again. The tasks of a stage begin when the one before is done.
-
-restore: each task reads the model once (22 bytes a vertex), restores its frames and writes them (12 bytes a vertex and
-frame). strip: the mesh is cut into clusters, reduced in rounds to a quarter each, finished by one task, and bound back
-up through the same clusters (docs/cluster.md).
+own network's. Some tasks are killed half way and run again. Each task reads the model once (22
+bytes a vertex), restores its frames and writes them (12 bytes a vertex and frame).
 
     farm.py --vertices 1e9 --frames 1000 --machines 1,10,100 --storage 10
-    farm.py --job strip --vertices 1e9 --machines 1,10,100 --storage 10
 """
 import argparse
 import heapq
 import random
 
 READ_BYTES, WRITE_BYTES = 22, 12  # a vertex: of the model; of a frame
-MESH_BYTES = 36  # a vertex: its place, and two triangles
-BOUND_BYTES, MODEL_BYTES = 8, 24  # a vertex: whom it follows and in which round; its record in a model file
-ONE_PIECE = 1.2e6  # vertices that are left to one task
-TASK_VERTICES = 4 << 20  # some 64 clusters
 
 
 class Storage:
@@ -44,52 +36,19 @@ class Storage:
         return self.now + max(0.0, self.ends[0][0] - self.each) / self.pace() if self.ends else float("inf")
 
 
-def restore_stages(machines, arguments):
-    """Of each stage its tasks: bytes read, seconds, bytes written."""
+def shot_tasks(machines, arguments):
+    """Of each task: bytes read, seconds, bytes written."""
     tasks = min(arguments.tasks or machines, arguments.frames)
     frames = arguments.frames / tasks
     seconds = frames * arguments.vertices / (arguments.rate * 1e9)
-    return [[(READ_BYTES * arguments.vertices, seconds, WRITE_BYTES * arguments.vertices * frames)] * tasks]
+    return [(READ_BYTES * arguments.vertices, seconds, WRITE_BYTES * arguments.vertices * frames)] * tasks
 
 
-def strip_stages(arguments):
-    """In: positions and triangles; out: a model file of chunks. A second is a machine's, with all its cores."""
-    def shared(vertices, read, seconds, written):  # bytes, microseconds and bytes a vertex
-        tasks = max(1, round(vertices / TASK_VERTICES))
-        share = vertices / tasks
-        return [(share * read, share * seconds * 1e-6 / arguments.cores, share * written)] * tasks
-
-    left, rounds = arguments.vertices, []
-    while left > ONE_PIECE:
-        rounds.append(left)
-        left /= 4
-    stages = [shared(arguments.vertices, 12, 0.05, 0),  # box and histogram of the lattice
-              shared(arguments.vertices, MESH_BYTES, 0.3, MESH_BYTES + 1)]  # cut; triangles at each vertex
-    for vertices in rounds:
-        stages.append(shared(vertices, MESH_BYTES + 1, 0.1, 0))  # free and locked vertices: the share is known then
-        stages.append(shared(vertices, MESH_BYTES + 1, arguments.reduce, MESH_BYTES / 4 + BOUND_BYTES))
-        if vertices > 4 * ONE_PIECE:
-            stages.append(shared(vertices / 4, MESH_BYTES, 0.3, MESH_BYTES + 1))  # cut anew, by a lattice that moved
-    stages.append([(MESH_BYTES * left, 4 * left / 1e6, MESH_BYTES * left)])  # one piece
-    for vertices in reversed(rounds):
-        is_last = vertices == arguments.vertices
-        stages.append(shared(vertices, MESH_BYTES + BOUND_BYTES, arguments.bind, MODEL_BYTES if is_last else BOUND_BYTES))
-    return stages + [[(1e6, 0.1, 1e6)]]  # the table in front of the chunks
-
-
-def simulate(machines, stages, arguments):
+def simulate(machines, tasks, arguments):
     """Seconds until all is written, and the share of the machines that have a task."""
     chance = random.Random(1)
     gigabyte = 1e9
     storage = Storage(arguments.storage * gigabyte, arguments.network * gigabyte)
-    busy = 0.0
-    for tasks in stages:
-        busy += simulate_stage(machines, tasks, storage, chance, arguments)
-    return storage.now, busy / (storage.now * machines)
-
-
-def simulate_stage(machines, tasks, storage, chance, arguments):
-    """Goes on from the storage's time until all of them are done; seconds that machines had a task."""
     waiting = list(range(len(tasks)))
     timers = []  # (time, task, what is over)
     idle, busy, done = machines, 0.0, 0
@@ -128,7 +87,7 @@ def simulate_stage(machines, tasks, storage, chance, arguments):
         busy += time - started
         idle += 1
         begin()
-    return busy
+    return storage.now, busy / (storage.now * machines)
 
 
 def main():
@@ -142,19 +101,14 @@ def main():
     parser.add_argument("--rate", type=float, default=0.6, help="thousand million vertices a second that one restores")
     parser.add_argument("--start", type=float, default=1, help="seconds until a scheduler has started a task")
     parser.add_argument("--lost", type=float, default=0.01, help="share of the tasks that are killed")
-    parser.add_argument("--job", choices=["restore", "strip"], default="restore")
-    parser.add_argument("--cores", type=float, default=16, help="strip: of a machine")
-    parser.add_argument("--reduce", type=float, default=1.2, help="strip: microseconds of a core a vertex in a round")
-    parser.add_argument("--bind", type=float, default=0.6, help="strip: the same, bound in that round")
     arguments = parser.parse_args()
-    what = f"{arguments.frames} frames" if arguments.job == "restore" else "stripped"
     totals = []
     for machines in map(int, arguments.machines.split(",")):
-        stages = restore_stages(machines, arguments) if arguments.job == "restore" else strip_stages(arguments)
-        moved = sum(read + written for tasks in stages for read, _, written in tasks)
-        written = sum(written for tasks in stages for _, _, written in tasks)
-        totals.append((machines, sum(map(len, stages)), moved, written, *simulate(machines, stages, arguments)))
-    print(f"{arguments.vertices:.3g} vertices, {what}: {totals[0][3] / 1e12:.3g} TB; storage {arguments.storage:g} GB/s")
+        tasks = shot_tasks(machines, arguments)
+        moved = sum(read + written for read, _, written in tasks)
+        written = sum(written for _, _, written in tasks)
+        totals.append((machines, len(tasks), moved, written, *simulate(machines, tasks, arguments)))
+    print(f"{arguments.vertices:.3g} vertices, {arguments.frames} frames: {totals[0][3] / 1e12:.3g} TB; storage {arguments.storage:g} GB/s")
     print("machines  tasks     hours  machines with task  storage at work")
     for machines, tasks, moved, _, seconds, at_work in totals:
         print(f"{machines:8} {tasks:6} {seconds / 3600:9.3f} {at_work:19.0%} "

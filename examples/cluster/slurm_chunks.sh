@@ -1,10 +1,9 @@
 #!/usr/bin/env bash
-# One chunk of a restore, render, sweep or strip, as a task of a Slurm array. A task that is killed is run again by itself
+# One chunk of a restore, render or sweep, as a task of a Slurm array. A task that is killed is run again by itself
 # (--requeue) or by submitting the same line once more: what is done is left as it is.
 # Usage: sbatch --array=1-40 slurm_chunks.sh 40 restore MODEL.fil --poses POSES -o SHOT.pc2
 #        sbatch --array=1-40 slurm_chunks.sh 40 render MODEL.fil --poses POSES... -o frame_%04d.png
 #        sbatch --array=1-40 slurm_chunks.sh 40 sweep SCENE.toml --set body.young_modulus=1e4,1e5 -o TABLE.csv
-#        sbatch --array=1-40 slurm_chunks.sh 40 strip MESH.ply -o MODEL.fil
 #SBATCH --job-name=filigree
 #SBATCH --cpus-per-task=2
 #SBATCH --requeue

@@ -275,16 +275,16 @@ protected:
         if (made.code != 0) GTEST_SKIP() << "no C compiler: " << made.err;
     }
 
-    /// words: a command for a folder and a chunk; `older` is finished in a before, and not to be lost. has_begun: the
-    /// other half is there already.
+    /// words: a command for a folder and a chunk; `older` is finished in a before, and not to be lost. The other half
+    /// is there already.
     void kill_everywhere(const std::function<std::vector<std::string>(const std::string&, const std::string&)>& words,
-                         const std::vector<std::string>& older, bool has_begun = true) {
+                         const std::vector<std::string>& older) {
         ok(words("b", ""));
         const auto whole = all_in("b");
         ok(older);
         const auto old = in_place("a");
         ASSERT_NE(old, whole);
-        if (has_begun) ok(words("a", "1/2"));
+        ok(words("a", "1/2"));
         namespace fs = std::filesystem;
         fs::copy(path("a"), path("begun"), fs::copy_options::recursive);
         int kills = 0;
@@ -361,110 +361,4 @@ TEST_F(KilledEverywhere, AShotIsTheOldOrTheNew) {
     };
     ok({"deform", "ball.fil", "-o", "other.fil", "--bend", "20", "--frames", "4"}); // a shot of the same size
     kill_everywhere(restore("moving.fil"), restore("other.fil")("a", "1/1"));
-}
-
-TEST_F(KilledEverywhere, AModelIsTheOldOrTheNew) {
-    ok({"make", "wavy-cube", "-o", "cube.ply", "--resolution", "24"});
-    const auto strip = [](const std::string& folder, const std::string& chunk) {
-        std::vector<std::string> words = {"strip",  "cube.ply", "-o",          folder + "/cube.fil",
-                                          "--base", "60",       "--one-piece", "600"};
-        if (!chunk.empty()) words.insert(words.end(), {"--chunk", chunk});
-        return words;
-    };
-    std::vector<std::string> older = strip("a", "1/1");
-    older[5] = "50";
-    kill_everywhere(strip, older, false); // one process makes all that others have not
-}
-
-namespace {
-
-/// A model of 3 clusters, then 1.
-class ChunkedStrip : public ChunkedItems {
-protected:
-    void SetUp() override {
-        ok({"make", "wavy-cube", "-o", "cube.ply", "--resolution", "180"});
-        ok(strip("b"));
-    }
-    static std::vector<std::string> strip(const std::string& folder, const std::string& chunk = "") {
-        std::vector<std::string> words = {"strip", "cube.ply", "-o", folder + "cube.fil", "--one-piece", "20000"};
-        if (!chunk.empty()) words.insert(words.end(), {"--chunk", chunk});
-        return words;
-    }
-    bool is_same() const { return bytes_of(path("acube.fil")) == bytes_of(path("bcube.fil")); }
-};
-
-} // namespace
-
-TEST_F(ChunkedStrip, OneProcessMakesItAllWhereNoOtherComes) {
-    const Json said = json(strip("a", "2/3"));
-    EXPECT_EQ(said["made"], said["tasks"]);
-    EXPECT_TRUE(said["is_whole"]);
-    EXPECT_GT(said["step_seconds"]["reduce"], 0);
-    EXPECT_TRUE(is_same());
-    for (const char* which : {"1/3", "3/3"}) EXPECT_EQ(json(strip("a", which))["made"], 0);
-    EXPECT_TRUE(is_same());
-    EXPECT_FALSE(std::filesystem::exists(path("acube.fil.chunks")));
-}
-
-TEST_F(ChunkedStrip, ManyAtTheSameTimeOfWhichSomeAreKilled) {
-    const auto line = [](const std::vector<std::string>& chunks) {
-        std::string all;
-        for (const std::string& which : chunks) all += "\"$0\" \"$@\" --threads 1 --quiet --chunk " + which + " & ";
-        return all;
-    };
-    for (const char* sleep : {"0.05", "0.2", "0.4", "0.7"}) {
-        // the one that is killed has every lock with it
-        const Ran ran = run_shell("{ " + line({"3/3"}) + "killed=$!; " + line({"2/3", "1/3"}) + "sleep " + sleep +
-                                      "; kill -9 $killed 2> /dev/null; wait; }",
-                                  strip("a"));
-        EXPECT_EQ(ran.err.find("filigree:"), std::string::npos) << ran.err;
-        EXPECT_TRUE(is_same()) << "killed after " << sleep;
-        EXPECT_FALSE(std::filesystem::exists(path("acube.fil.chunks")));
-        for (const char* name : {"acube.fil", "acube.fil.plan"}) std::filesystem::remove(path(name));
-    }
-}
-
-/// Some file systems have none: tasks are made twice then.
-TEST_F(ChunkedStrip, WithoutLocksTheBytesAreTheSame) {
-    if (kSanitized) GTEST_SKIP() << "a sanitizer wants to be loaded first";
-    const Ran built =
-        run_shell("cc -shared -fPIC -o locks.so \"$1\" -ldl", {FILIGREE_ROOT "/tests/torture/no_locks.c"});
-    if (built.code != 0) GTEST_SKIP() << "no C compiler: " << built.err;
-    std::string line;
-    for (const char* which : {"1/3", "2/3", "3/3"})
-        line += std::string("\"$0\" \"$@\" --threads 1 --quiet --chunk ") + which + " & ";
-    const Ran ran = run_shell("export LD_PRELOAD=./locks.so; { " + line + "wait; }", strip("a"));
-    EXPECT_EQ(ran.err, "");
-    EXPECT_TRUE(is_same());
-    EXPECT_FALSE(std::filesystem::exists(path("acube.fil.chunks")));
-}
-
-TEST_F(ChunkedStrip, PlansAreNotMixed) {
-    ASSERT_EQ(run(strip("a", "1/2"), "/dev/null", 0.15, SIGKILL).code, -1);
-    std::vector<std::string> other = strip("a", "2/2");
-    other.insert(other.end(), {"--base", "500"});
-    fails(8, other, {"acube.fil.chunks", "another job"});
-    ok({"make", "wavy-cube", "-o", "cube.ply", "--resolution", "60"});
-    fails(8, strip("a", "2/2"), {"another job"});
-    ok({"make", "wavy-cube", "-o", "cube.ply", "--resolution", "180"});
-    ok(strip("a", "2/5"));
-    EXPECT_TRUE(is_same()) << "the number of chunks may be another";
-    // The next mesh under the same name.
-    ok({"make", "wavy-cube", "-o", "cube.ply", "--resolution", "60"});
-    ok(strip("a", "2/2"));
-    ok(strip("b"));
-    EXPECT_TRUE(is_same());
-}
-
-TEST_F(ChunkedStrip, WhatMakesNoSense) {
-    for (const char* wrong : {"0/3", "4/3", "3", "a/b"}) fails(2, strip("a", wrong), {"K/N"});
-    for (const std::vector<std::string>& more :
-         {std::vector<std::string>{"--code", "reference"}, {"--driver", "cube.ply"}, {"--fidelity", "1e-4"}}) {
-        std::vector<std::string> words = strip("a", "1/2");
-        words.insert(words.end(), more.begin(), more.end());
-        fails(2, words, {"--chunk"});
-    }
-    fails(6, strip("no/such/folder/", "1/2"), {"no such folder"});
-    fails(2, {"strip", "-", "-o", "a.fil", "--chunk", "1/2"}, {"--chunk"});
-    EXPECT_FALSE(std::filesystem::exists(path("acube.fil.chunks")));
 }

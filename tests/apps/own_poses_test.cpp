@@ -7,7 +7,7 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/render/picture.h"
+#include "filigree/render.h"
 
 #include <numbers>
 
@@ -68,7 +68,6 @@ TEST_F(OwnPoses, AreRestoredOneByOne) {
     fails(7, {"restore", "still.fil", "--frame", "1", "-o", "x.ply"}, {"still.fil", "no poses", "filigree simulate"});
     fails(2, {"restore", "moving.fil", "-o", "x.ply"}, {"--pose", "--frame"});
     fails(2, {"restore", "moving.fil", "--frame", "1", "--pose", "third.ply", "-o", "x.ply"}, {"--pose", "--frame"});
-    fails(2, {"restore", "moving.fil", "--frame", "1", "--ghosts", "third.ply", "-o", "x.ply"}, {"--ghosts"});
 }
 
 TEST_F(OwnPoses, AreRestoredAllIntoAFolder) {

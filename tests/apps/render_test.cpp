@@ -1,7 +1,7 @@
 // filigree render, and compare --picture, as a user runs them.
 #include "apps/program.h"
 
-#include "filigree/render/picture.h"
+#include "filigree/render.h"
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,7 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
 #include "filigree/physics/simulation.h"
-#include "filigree/render/picture.h"
+#include "filigree/render.h"
 
 using namespace filigree_test;
 using namespace filigree;

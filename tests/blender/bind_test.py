@@ -30,11 +30,7 @@ def test_settings_reach_the_library():
     high = add(filigree.make("wavy-plane", resolution=40), "sheet")
     bpy.ops.filigree.make_driver(vertices=200)
     high.filigree.driver.scale.x = 3
-    shapes = []
-    for law, thin in (("keep", True), ("volume", True), ("keep", False)):
-        high.filigree.law, high.filigree.thin_shell = law, thin
-        shapes.append(shown(high).copy())
-    assert largest(shapes[0], shapes[1]) > 1e-3 and largest(shapes[0], shapes[2]) > 1e-4
+    assert largest(shown(high), meshes.vertices_of(high.data)) > 0.1
     high.filigree.enabled = False
     assert largest(shown(high), meshes.vertices_of(high.data)) == 0
 

@@ -41,7 +41,7 @@ Mesh tube(bool has_colors = true) {
     return mesh;
 }
 
-CodedMesh stream_of(const Mesh& mesh) {
+CodedMesh frames_of(const Mesh& mesh) {
     return encode_mesh(mesh, {.keep_order = true, .levels = true}, nullptr, kTwoThreads).value();
 }
 
@@ -75,7 +75,7 @@ void expect_same_attributes(const Mesh& mesh, const Mesh& read) {
 }
 
 void expect_round_trip(const Mesh& mesh) {
-    const CodedMesh code = stream_of(mesh);
+    const CodedMesh code = frames_of(mesh);
     EXPECT_FALSE(code.levels.attributes.empty());
     expect_same_attributes(mesh, decode_mesh(code, kTwoThreads).value());
 }
@@ -96,7 +96,7 @@ TEST(LevelAttributes, TheWholeIsWhatWasWritten) {
 }
 
 TEST(LevelAttributes, EveryLevelHasThoseOfTheSurface) {
-    const CodedMesh code = stream_of(tube());
+    const CodedMesh code = frames_of(tube());
     LevelReader reader = reader_of(code);
     for (std::size_t k = 0; k <= code.levels.levels.size(); ++k) {
         const Mesh level = mesh_of_levels(reader, code);
@@ -147,18 +147,18 @@ TEST(LevelAttributes, SeamsEverywhereLeaveTheLevelsWithout) {
         mesh.uvs.corners[c] = static_cast<Index>(c);
         mesh.uvs.values.emplace_back(float(c / 4 % 50) / 50 + 0.01f * float(c % 2), float(c / 200) / 60);
     }
-    const CodedMesh code = stream_of(mesh);
+    const CodedMesh code = frames_of(mesh);
     EXPECT_TRUE(code.levels.attributes.empty());
     EXPECT_LT(code.levels.vertices, 600u);
     expect_same_attributes(mesh, decode_mesh(code, kTwoThreads).value());
 }
 
 TEST(LevelAttributes, AMeshWithoutAnyIsCodedWithoutThem) {
-    EXPECT_TRUE(stream_of(make_wavy_sphere({.resolution = 24})).levels.attributes.empty());
+    EXPECT_TRUE(frames_of(make_wavy_sphere({.resolution = 24})).levels.attributes.empty());
 }
 
 TEST(LevelAttributes, DamageIsNamedOrHarmless) {
-    const CodedMesh code = stream_of(tube());
+    const CodedMesh code = frames_of(tube());
     std::mt19937 random(5);
     const auto try_it = [&](const CodedMesh& damaged) {
         const Result<Mesh> read = decode_mesh(damaged, kTwoThreads);
@@ -190,7 +190,7 @@ TEST(LevelAttributes, DamageIsNamedOrHarmless) {
         EXPECT_FALSE(decode_mesh(cut, kTwoThreads).ok());
     }
     CodedMesh other = code; // of another mesh
-    other.levels.attributes = stream_of(tube(false)).levels.attributes;
+    other.levels.attributes = frames_of(tube(false)).levels.attributes;
     try_it(other);
 }
 

@@ -14,7 +14,7 @@ using namespace filigree;
 
 namespace {
 
-CodedMesh stream_of(const Mesh& mesh, bool surface = false) {
+CodedMesh frames_of(const Mesh& mesh, bool surface = false) {
     return encode_mesh(mesh, {.surface = surface, .levels = true}, nullptr, kTwoThreads).value();
 }
 
@@ -28,7 +28,7 @@ void expect_closed(const ClosedMap& map) {
     for (Index h = 0; h < map.opposite.size(); ++h) {
         ASSERT_LT(map.opposite[h], map.opposite.size());
         ASSERT_EQ(map.opposite[map.opposite[h]], h);
-        ASSERT_EQ(map.origin(map.opposite[h]), map.origin(ClosedMap::next(h)));
+        ASSERT_EQ(map.origin(map.opposite[h]), map.origin(next_half_edge(h)));
     }
 }
 
@@ -52,7 +52,7 @@ Mesh bumpy_sheet() { // a border, and two holes in it
 
 TEST(LevelCode, EveryLevelIsNearer) {
     for (const Mesh& mesh : {make_wavy_sphere({.resolution = 48}), bumpy_sheet()}) {
-        const CodedMesh code = stream_of(mesh);
+        const CodedMesh code = frames_of(mesh);
         LevelReader reader = reader_of(code);
         ASSERT_TRUE(reader.read_coarsest(code.levels.connectivity, code.levels.places));
         EXPECT_LE(reader.map().vertex_count(), 520u);
@@ -78,7 +78,7 @@ TEST(LevelCode, EveryLevelIsNearer) {
 
 TEST(LevelCode, BordersStayWhereTheyAre) {
     const Mesh mesh = bumpy_sheet();
-    const CodedMesh code = stream_of(mesh);
+    const CodedMesh code = frames_of(mesh);
     LevelReader reader = reader_of(code);
     ASSERT_TRUE(reader.read_coarsest(code.levels.connectivity, code.levels.places));
     const Box box = bounds(mesh_of_levels(reader, code).positions);
@@ -120,7 +120,7 @@ TEST(LevelCode, ABatchCanBeTakenBackInAnyOrder) {
 
 TEST(LevelCode, OneThreadOrMany) {
     const Mesh mesh = make_wavy_sphere({.resolution = 40});
-    const CodedMesh one = encode_mesh(mesh, {.levels = true}, nullptr, RunContext(1)).value(), many = stream_of(mesh);
+    const CodedMesh one = encode_mesh(mesh, {.levels = true}, nullptr, RunContext(1)).value(), many = frames_of(mesh);
     ASSERT_EQ(one.levels.levels.size(), many.levels.levels.size());
     for (std::size_t k = 0; k < one.levels.levels.size(); ++k)
         EXPECT_EQ(one.levels.levels[k].splits, many.levels.levels[k].splits);
@@ -128,7 +128,7 @@ TEST(LevelCode, OneThreadOrMany) {
 
 TEST(LevelCode, DamageIsNamedOrHarmless) {
     const Mesh mesh = make_wavy_sphere({.resolution = 16});
-    const CodedMesh code = stream_of(mesh);
+    const CodedMesh code = frames_of(mesh);
     std::mt19937 random(3);
     const auto try_it = [&](const CodedMesh& damaged) {
         const Result<Mesh> read = decode_mesh(damaged, kTwoThreads);

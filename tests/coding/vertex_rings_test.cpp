@@ -67,7 +67,7 @@ TEST(ClosedMap, OppositesOfTrianglesAlone) {
     for (Index h = 0; h < map.opposite.size(); ++h) {
         ASSERT_NE(map.opposite[h], kNoIndex);
         EXPECT_EQ(map.opposite[map.opposite[h]], h);
-        EXPECT_EQ(map.origin(map.opposite[h]), map.origin(ClosedMap::next(h)));
+        EXPECT_EQ(map.origin(map.opposite[h]), map.origin(next_half_edge(h)));
     }
     const ClosedMap open = map_of({{0, 1, 2}}, std::vector<bool>(3));
     EXPECT_EQ(std::ranges::count(open.opposite, kNoIndex), 3);

@@ -20,7 +20,7 @@ TEST(CarriedPoints, GoAlongWithARigidMotion) {
 }
 
 TEST(CarriedPoints, FollowTheNearestVertexMost) {
-    Pose pose{kCorners, {}, {}};
+    Pose pose{kCorners, {}};
     pose.positions[1] += Vec3f(0, 0, 1); // the corner beside the second point
     const std::vector<Vec3f> carried = carried_points(kPoints, kCorners, pose, RunContext());
     EXPECT_GT(carried[1].z() - kPoints[1].z(), 0.9f);
@@ -39,7 +39,7 @@ TEST(CarriedPoints, UnitsOfAnySizeServe) {
             for (Vec3f& p : points) p *= std::exp2(float(power));
             return points;
         };
-        const Pose there{scaled(pose.positions), pose.gradients, {}};
+        const Pose there{scaled(pose.positions), pose.gradients};
         EXPECT_EQ(carried_points(scaled(kPoints), scaled(kCorners), there, RunContext()), scaled(usual)) << power;
     }
     const std::vector<Vec3f> far = {{1e15f, 0, 0}};

@@ -101,15 +101,6 @@ TEST(Fidelity, OfADriverIsMeasuredOnSomeVertices) {
     EXPECT_EQ(driver_fidelity(model, cancelled).error().code, ErrorCode::cancelled);
 }
 
-TEST(Fidelity, OfAReferenceModelHasNoUseForGradients) {
-    StripOptions options;
-    options.code = DetailCode::reference;
-    const Model model = strip(make_wavy_cube({.resolution = 32}), options, kOneThread).value().model;
-    const DriverFidelity measured = driver_fidelity(model, kOneThread).value();
-    EXPECT_EQ(measured.positions, fidelity(model, PoseSource::positions, kOneThread).value());
-    EXPECT_EQ(measured.positions, measured.gradients);
-}
-
 using WarpList = std::vector<std::unique_ptr<SpaceWarp>>;
 
 double largest_error(const Model& model, const WarpList& warps, PoseSource source) {
@@ -194,12 +185,10 @@ TEST(Fidelity, WholeMeshWhereNothingLessWillDo) {
 
 TEST(Fidelity, RefusesWhatMakesNoSense) {
     const Mesh mesh = make_wavy_sphere({.resolution = 8});
-    StripOptions reference, sized;
-    reference.code = DetailCode::reference;
+    StripOptions sized;
     sized.base = 20;
     for (const auto& result :
-         {strip_to_fidelity(mesh, {}, {0, {}}, kOneThread), strip_to_fidelity(mesh, reference, {}, kOneThread),
-          strip_to_fidelity(mesh, sized, {}, kOneThread)})
+         {strip_to_fidelity(mesh, {}, {0, {}}, kOneThread), strip_to_fidelity(mesh, sized, {}, kOneThread)})
         EXPECT_EQ(result.error().code, ErrorCode::usage);
     RunContext cancelled(1);
     cancelled.cancel();

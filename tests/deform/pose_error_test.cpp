@@ -157,7 +157,7 @@ TEST(PoseError, CountsThatDoNotFitAreErrors) {
     const auto few = error.estimate(pose, std::span(gradients).first(3));
     ASSERT_FALSE(few.ok());
     EXPECT_EQ(few.error().code, ErrorCode::mismatch);
-    const auto other = error.estimate(Pose{{Vec3f::Zero()}, {}, {}}, gradients);
+    const auto other = error.estimate(Pose{{Vec3f::Zero()}, {}}, gradients);
     ASSERT_FALSE(other.ok());
     EXPECT_EQ(other.error().code, ErrorCode::mismatch);
 }

@@ -1,7 +1,7 @@
+#include "filigree/fracture.h"
 #include "filigree/fracture/broken_model.h"
 
 #include "filigree/deform/space_warp.h"
-#include "filigree/fracture/fracture_pattern.h"
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"
@@ -116,15 +116,10 @@ TEST(BrokenModel, CracksOpenWhereCopiesPart) {
     }
 }
 
-TEST(BrokenModel, RefusesOtherMeshesAndCodes) {
+TEST(BrokenModel, RefusesOtherMeshes) {
     const Case ball = broken_ball(0);
     const Mesh other = make_wavy_cube({.resolution = 8});
     EXPECT_EQ(break_model(strip(other, {}, kOneThread).value().model, ball.fractured, ball.cells, 0.1, kOneThread)
-                  .error()
-                  .code,
-              ErrorCode::unsuitable);
-    EXPECT_EQ(break_model(strip(other, {.code = DetailCode::reference}, kOneThread).value().model, ball.fractured,
-                          ball.cells, 0.1, kOneThread)
                   .error()
                   .code,
               ErrorCode::unsuitable);

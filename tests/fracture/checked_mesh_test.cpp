@@ -1,7 +1,6 @@
 // Public calls of the layer look at the meshes they are given.
 #include "broken_meshes.h"
-#include "filigree/fracture/fracture.h"
-#include "filigree/fracture/fracture_pattern.h"
+#include "filigree/fracture.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

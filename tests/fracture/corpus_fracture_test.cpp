@@ -1,6 +1,5 @@
 #include "cases.h"
-#include "filigree/fracture/fracture.h"
-#include "filigree/fracture/fracture_pattern.h"
+#include "filigree/fracture.h"
 #include "filigree/io/mesh_file.h"
 #include "io/corpus.h"
 

@@ -1,6 +1,8 @@
-#include "filigree/fracture/fracture_cells.h"
+#include "filigree/fracture.h"
+#include "filigree/fracture/crack_warp.h"
 
 #include "filigree/core/random.h"
+#include "filigree/fracture/voronoi.h"
 
 #include <Eigen/LU>
 #include <gtest/gtest.h>

@@ -1,8 +1,7 @@
-#include "filigree/fracture/fracture.h"
+#include "filigree/fracture.h"
 
 #include "cases.h"
 #include "filigree/core/random.h"
-#include "filigree/fracture/fracture_pattern.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/surface.h"

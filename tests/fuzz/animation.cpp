@@ -44,10 +44,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const TemporaryFile file(kNames[bytes.byte() % std::size(kNames)]);
     const std::size_t points = bytes.byte();
     file.write(bytes.rest());
-    const Result<PoseStream> poses = open_poses(file.path(), points, Vec3d::Zero(), {}, kContext);
+    const Result<FrameSource<Pose>> poses = open_poses(file.path(), points, Vec3d::Zero(), {}, kContext);
     if (!is_sound(poses)) return 0;
     for (std::size_t frame = 0; frame < std::min<std::size_t>(poses->frames, 3); ++frame) {
-        const Result<Pose> pose = poses->pose(frame);
+        const Result<Pose> pose = poses->frame(frame);
         if (is_sound(pose)) require(pose->positions.size() == points, "a pose has as many points as were asked for");
     }
     return 0;

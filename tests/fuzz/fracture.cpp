@@ -1,7 +1,7 @@
 // Breaking any mesh: vertices stay to the bit, volumes add up, every piece is as closed as the mesh.
 #include "fuzz.h"
 
-#include "filigree/fracture/fracture.h"
+#include "filigree/fracture.h"
 
 using namespace filigree_fuzz;
 

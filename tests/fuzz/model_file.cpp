@@ -7,6 +7,7 @@
 #include "filigree/io/model_chunks.h"
 #include "filigree/io/model_file.h"
 #include "filigree/io/model_sections.h"
+#include "filigree/io/reference_file.h"
 #include "filigree/mesh/shapes.h"
 
 #include <filesystem>
@@ -80,7 +81,7 @@ std::vector<std::string> seeds() {
         all.push_back(coded_file(model, {.levels = true}));
     }
     const Mesh cube = make_wavy_cube({.resolution = 4});
-    all.push_back(write_model(strip(cube, {.code = DetailCode::reference}, kContext).value().model));
+    all.push_back(write_reference_model(strip_to_reference(cube, {}, kContext).value()));
     all.push_back(write_model(strip(cube, {.base = 20, .reorder = true}, kContext).value().model));
     Mesh painted = mesh; // two materials, a texture and colours, in levels
     painted.materials.names = {"a", "b"};
@@ -108,6 +109,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
             if (is_sound(level)) require(check_mesh(*level).empty(), "a level is a sound mesh");
         }
     is_sound(ModelChunks::open(FileReader(std::string_view(bytes)), "fuzz", kContext));
+    if (const Result<ReferenceModel> reference = read_reference_model(file, "fuzz", kContext); is_sound(reference)) {
+        require(check_model(*reference).empty(), "what was read is a sound model");
+        is_sound(restore_reference(*reference, driver_positions(*reference), {}, kContext));
+    }
     if (!is_sound(model)) return 0;
     require(check_model(*model).empty(), "what was read is a sound model");
     if (!outline.ok()) { // it looks for the poses, which the model can do without

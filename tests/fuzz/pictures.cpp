@@ -1,7 +1,7 @@
 // The reader of pictures, PNG and JPEG: pixels as many as it says, or a sentence; ours come back the same.
 #include "fuzz.h"
 
-#include "filigree/render/picture.h"
+#include "filigree/render.h"
 
 using namespace filigree_fuzz;
 

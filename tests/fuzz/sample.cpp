@@ -1,7 +1,7 @@
 // Points inside any mesh: by scan and by rays the same, where the mesh is closed.
 #include "fuzz.h"
 
-#include "filigree/sample/sample_inside.h"
+#include "filigree/sample.h"
 
 using namespace filigree_fuzz;
 

@@ -21,7 +21,7 @@ const RunContext kTwoThreads(2);
 
 /// As far off as the rounding of records may be, in model units.
 double allowed(const Model& model, double diagonal) {
-    const auto& detail = std::get<BlendDetail>(model.detail);
+    const auto& detail = model.detail;
     return (detail.precision == Precision::int16 ? 2e-4 : 2e-5) * (1 + diagonal);
 }
 
@@ -40,7 +40,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(check_model(model).empty(), "the model is sound");
     const Result<Stripped> other = strip(mesh, how, kTwoThreads);
     require(other.ok() && other->model.driver().vertices == model.driver().vertices &&
-                std::get<BlendDetail>(other->model.detail).order == std::get<BlendDetail>(model.detail).order,
+                other->model.detail.order == model.detail.order,
             "two threads give what one does");
 
     const Restorer restorer = Restorer::create(model, {}, kContext).value();

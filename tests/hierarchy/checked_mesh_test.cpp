@@ -14,9 +14,6 @@ TEST(CheckedStrip, WhatIsBrokenIsRefused) {
     FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED([](const Mesh& m) { return strip(m, {}, kOneThread); });
     FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED([](const Mesh& m) { return strip(m, {.reorder = true}, kOneThread); });
     FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED(
-        [](const Mesh& m) { return strip(m, {.code = DetailCode::reference}, kOneThread); });
-    FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED([](const Mesh& m) { return encode_reference(m, {}, kOneThread); });
-    FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED(
         [&](const Mesh& m) { return strip_to_driver(m, sound, Precision::float32, kOneThread); });
     FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED(
         [&](const Mesh& m) { return strip_to_driver(sound, m, Precision::float32, kOneThread); });
@@ -58,10 +55,6 @@ TEST(CheckedStrip, ARestorerThatIsCancelledIsNotMade) {
     ASSERT_FALSE(restorer.ok());
     EXPECT_EQ(restorer.error().code, ErrorCode::cancelled);
 }
-
-static_assert(!std::is_constructible_v<ReferenceRestorer, ReferenceDetail, HeightLaw, const RunContext&>,
-              "it keeps a reference");
-static_assert(std::is_constructible_v<ReferenceRestorer, const ReferenceDetail&, HeightLaw, const RunContext&>);
 
 } // namespace
 } // namespace filigree

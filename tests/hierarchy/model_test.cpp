@@ -20,8 +20,7 @@ void expect_all_seen(const Model& sound, const std::vector<Damage>& damages) {
     }
 }
 
-BlendDetail& blend(Model& model) { return std::get<BlendDetail>(model.detail); }
-ReferenceDetail& reference(Model& model) { return std::get<ReferenceDetail>(model.detail); }
+BlendDetail& blend(Model& model) { return model.detail; }
 
 const Mesh kPlane = make_wavy_plane({.resolution = 8});
 
@@ -65,22 +64,6 @@ TEST(Model, DamageOfTheBlendCodeIsSeen) {
              blend(m).across_gap = {3, 3};
          },
          [](Model& m) { blend(m).facing_away = {81}; }});
-}
-
-TEST(Model, DamageOfTheReferenceCodeIsSeen) {
-    expect_all_seen(
-        stripped(kPlane, {.code = DetailCode::reference}).model,
-        {[](Model& m) { m.levels.pop_back(); }, [](Model& m) { reference(m).references = 5; },
-         [](Model& m) { reference(m).patches.levels = 0; }, [](Model& m) { reference(m).patches.levels = 40; },
-         [](Model& m) { reference(m).patches.base.clear(); }, [](Model& m) { reference(m).patches.base[0][0] ^= 1; },
-         [](Model& m) { reference(m).patches.grid.pop_back(); }, [](Model& m) { reference(m).patches.grid[4] = 81; },
-         [](Model& m) { reference(m).patches.grid[10] = reference(m).patches.grid[11]; },
-         [](Model& m) { reference(m).rest_driver.pop_back(); }, [](Model& m) { reference(m).rest_driver[0].z() = NAN; },
-         [](Model& m) { reference(m).records.pop_back(); }, [](Model& m) { reference(m).records[2].x() = INFINITY; },
-         [](Model& m) { reference(m).extent = NAN; }, [](Model& m) { reference(m).loose = {1000}; },
-         [](Model& m) {
-             reference(m).loose = {2, 1};
-         }});
 }
 
 TEST(Model, LevelMeshesCarryWhatVerticesHave) {

@@ -55,29 +55,13 @@ TEST(Restore, AffineMapsAreExactWithGradients) {
     }
 }
 
-TEST(Restore, AffineMapsAreExactWithGhosts) {
-    Mat3d shear;
-    shear << 2, 0.3, 0, 0, 0.5, 0.2, -0.1, 0, 1.5;
-    const Deformation f = affine(shear, kShift);
-    for (const Mesh& mesh : some_shapes()) {
-        const Model model = stripped(mesh).model;
-        Pose pose = without_gradients(pose_by(f, model));
-        pose.ghosts = deformed(f, restorer_of(model).rest_ghosts());
-        // A ghost is a tenth of an edge away, so that float's rounding of it weighs tenfold.
-        EXPECT_LE(distance(restored(model, pose), deformed(f, mesh.positions)).max, 3e-6);
-    }
-}
-
 TEST(Restore, RigidMotionIsExactFromPositions) {
     const Deformation f = affine(kTurn, kShift);
-    for (const Mesh& mesh : some_shapes())
-        for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume})
-            for (const bool shell : {false, true}) {
-                const Model model = stripped(mesh).model;
-                const std::vector<Vec3f> moved =
-                    restored(model, without_gradients(pose_by(f, model)), {.law = law, .thin_shell = shell});
-                EXPECT_LE(distance(moved, deformed(f, mesh.positions)).max, 2e-6) << height_law_name(law) << shell;
-            }
+    for (const Mesh& mesh : some_shapes()) {
+        const Model model = stripped(mesh).model;
+        const std::vector<Vec3f> moved = restored(model, without_gradients(pose_by(f, model)));
+        EXPECT_LE(distance(moved, deformed(f, mesh.positions)).max, 2e-6);
+    }
 }
 
 TEST(Restore, UniformScaleIsExactFromPositionsInProportion) {
@@ -119,22 +103,20 @@ TEST(Restore, CurvedWarpsOfTheCubeAreAsCloseAsTheDesignSays) {
 
 TEST(Restore, EveryLevelIsTheFinestAtItsVertices) {
     const Mesh mesh = make_wavy_cube({.resolution = 32});
-    for (const DetailCode code : {DetailCode::blend, DetailCode::reference}) {
-        const Model model = stripped(mesh, {.code = code, .levels = 3}).model;
-        const Pose pose = pose_by(bend(90), model);
-        const std::vector<Vec3f> finest = restored(model, pose);
-        for (unsigned k = 0; k < 3; ++k) {
-            const std::vector<Vec3f> level = restored(model, pose, {.level = k});
-            ASSERT_EQ(level.size(), model.levels[k].vertices.size());
-            for (std::size_t i = 0; i < level.size(); ++i) ASSERT_EQ(level[i], finest[model.levels[k].vertices[i]]);
-        }
-        for (std::size_t i = 0; i < pose.positions.size(); ++i) // the driver goes where it is put
-            ASSERT_LT((finest[model.driver().vertices[i]] - pose.positions[i]).norm(), 2e-6f);
+    const Model model = stripped(mesh, {.levels = 3}).model;
+    const Pose pose = pose_by(bend(90), model);
+    const std::vector<Vec3f> finest = restored(model, pose);
+    for (unsigned k = 0; k < 3; ++k) {
+        const std::vector<Vec3f> level = restored(model, pose, {.level = k});
+        ASSERT_EQ(level.size(), model.levels[k].vertices.size());
+        for (std::size_t i = 0; i < level.size(); ++i) ASSERT_EQ(level[i], finest[model.levels[k].vertices[i]]);
     }
+    for (std::size_t i = 0; i < pose.positions.size(); ++i) // the driver goes where it is put
+        ASSERT_LT((finest[model.driver().vertices[i]] - pose.positions[i]).norm(), 2e-6f);
 }
 
-/// A flat driver with bumps on it, stretched along x: thin shells scale heights by the law, and by nothing else.
-TEST(Restore, ThinShellsKeepTheHeightTheLawSays) {
+/// A flat driver with bumps on it, stretched along x: from positions alone heights grow with the root of the area.
+TEST(Restore, OnFlatDriversHeightsGrowWithTheRootOfTheArea) {
     const Mesh mesh = make_wavy_plane({.resolution = 64, .frequency = 4, .amplitude = 0.02});
     // A driver on the waves' zero lines is flat: every eighth row and column.
     Model model;
@@ -165,21 +147,13 @@ TEST(Restore, ThinShellsKeepTheHeightTheLawSays) {
 
     const double stretch = 2.25;
     const Deformation f = affine(Vec3d(stretch, 1, 1).asDiagonal(), Vec3d::Zero());
-    const std::pair<HeightLaw, double> expected[] = {{HeightLaw::keep, 1},
-                                                     {HeightLaw::inverse, 1 / std::sqrt(stretch)},
-                                                     {HeightLaw::proportional, std::sqrt(stretch)},
-                                                     {HeightLaw::volume, 1 / stretch}};
-    for (const auto& [law, factor] : expected)
-        for (const bool with_gradients : {false, true}) {
-            const Pose pose = with_gradients ? pose_by(f, model) : without_gradients(pose_by(f, model));
-            const std::vector<Vec3f> moved = restored(model, pose, {.law = law, .thin_shell = true});
-            for (std::size_t v = 0; v < moved.size(); ++v)
-                ASSERT_LT((moved[v] - Vec3f(float(stretch) * mesh.positions[v].x(), mesh.positions[v].y(),
-                                            float(factor) * mesh.positions[v].z()))
-                              .norm(),
-                          1e-5f)
-                    << height_law_name(law) << ' ' << with_gradients << ' ' << v;
-        }
+    const std::vector<Vec3f> moved = restored(model, without_gradients(pose_by(f, model)));
+    for (std::size_t v = 0; v < moved.size(); ++v)
+        ASSERT_LT((moved[v] - Vec3f(float(stretch) * mesh.positions[v].x(), mesh.positions[v].y(),
+                                    float(std::sqrt(stretch)) * mesh.positions[v].z()))
+                      .norm(),
+                  1e-5f)
+            << v;
 }
 
 TEST(Restore, NormalsFollowByTheCofactor) {
@@ -258,18 +232,14 @@ TEST(Restore, GradientsAtHandGiveTheSameBytes) {
     mesh.normals.values = vertex_normals(mesh, mesh.positions, kOneThread);
     const Model model = stripped(mesh).model;
     const Pose pose = without_gradients(pose_by(bend(120), model));
-    for (const bool thin_shell : {false, true}) {
-        RestoreOptions options;
-        options.thin_shell = thin_shell;
-        const Restorer restorer = Restorer::create(model, options, kOneThread).value();
-        const std::vector<Mat3f> gradients = restorer.gradients(pose, kOneThread).value();
-        const Mesh anew = restorer.mesh(pose, kOneThread).value();
-        const Mesh at_hand = restorer.mesh(pose, gradients, kOneThread).value();
-        EXPECT_TRUE(same_bytes(anew.positions, at_hand.positions));
-        EXPECT_TRUE(same_bytes(anew.normals.values, at_hand.normals.values));
-        const std::span<const Mat3f> too_few(gradients.data(), 3);
-        EXPECT_EQ(restorer.mesh(pose, too_few, kOneThread).error().code, ErrorCode::mismatch);
-    }
+    const Restorer restorer = restorer_of(model);
+    const std::vector<Mat3f> gradients = restorer.gradients(pose, kOneThread).value();
+    const Mesh anew = restorer.mesh(pose, kOneThread).value();
+    const Mesh at_hand = restorer.mesh(pose, gradients, kOneThread).value();
+    EXPECT_TRUE(same_bytes(anew.positions, at_hand.positions));
+    EXPECT_TRUE(same_bytes(anew.normals.values, at_hand.normals.values));
+    const std::span<const Mat3f> too_few(gradients.data(), 3);
+    EXPECT_EQ(restorer.mesh(pose, too_few, kOneThread).error().code, ErrorCode::mismatch);
 }
 
 TEST(Restore, PosesOfOtherModelsAreRefused) {
@@ -284,18 +254,12 @@ TEST(Restore, PosesOfOtherModelsAreRefused) {
     pose.gradients.resize(pose.positions.size() - 1, Mat3f::Identity());
     EXPECT_EQ(code(pose), ErrorCode::mismatch);
     pose.gradients.clear();
-    pose.ghosts.resize(1);
-    EXPECT_EQ(code(pose), ErrorCode::mismatch);
-    pose.ghosts.clear();
     pose.positions.pop_back();
     EXPECT_EQ(code(pose), ErrorCode::mismatch);
     EXPECT_EQ(Restorer::create(model, {.level = 17}, kOneThread).error().code, ErrorCode::usage);
 
     Pose few = rest_pose(model);
     few.positions.pop_back();
-    EXPECT_EQ(restorer_of(model).gradients(few, kOneThread).error().code, ErrorCode::mismatch);
-    few = rest_pose(model);
-    few.ghosts.resize(1, Vec3f::Zero());
     EXPECT_EQ(restorer_of(model).gradients(few, kOneThread).error().code, ErrorCode::mismatch);
 }
 

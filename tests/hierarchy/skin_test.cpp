@@ -137,14 +137,6 @@ TEST(Skin, OfACoarserLevelHasItsVertices) {
     }
 }
 
-TEST(Skin, OfTheReferenceCodeIsRefused) {
-    const Model model =
-        strip(make_wavy_cube({.resolution = 16}), {.code = DetailCode::reference}, kAllThreads).value().model;
-    const Result<Skin> skin = make_skin(model, model.finest_level(), 3, true);
-    ASSERT_FALSE(skin.ok());
-    EXPECT_EQ(skin.error().code, ErrorCode::unsuitable);
-}
-
 Mat3d matrix_of(const NestedRotations& parts) {
     return parts.outer_rotation.toRotationMatrix() * parts.outer_scale.asDiagonal() *
            parts.inner_rotation.toRotationMatrix() * kInnerScale.asDiagonal();

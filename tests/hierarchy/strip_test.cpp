@@ -229,7 +229,7 @@ TEST(Strip, SameBytesForAnyThreads) {
         const Mesh mesh = make_wavy_cube({.resolution = 80});
         const StripOptions options{.base = 500, .precision = precision};
         const Model one = stripped(mesh, options).model, two = stripped(mesh, options, RunContext(2)).model;
-        const auto &a = std::get<BlendDetail>(one.detail), &b = std::get<BlendDetail>(two.detail);
+        const BlendDetail &a = one.detail, &b = two.detail;
         EXPECT_EQ(a.order, b.order);
         EXPECT_EQ(a.cells, b.cells);
         EXPECT_EQ(a.u, b.u);
@@ -253,11 +253,7 @@ TEST(Strip, OptionsThatMakeNoSenseAreRefused) {
     EXPECT_EQ(code(mesh, {.error = NAN}), ErrorCode::usage);
     EXPECT_EQ(code(mesh, {.max_edge = 0}), ErrorCode::usage);
     EXPECT_EQ(code(mesh, {.max_edge = NAN}), ErrorCode::usage);
-    EXPECT_EQ(code(mesh, {.code = DetailCode::reference, .max_edge = 0.1}), ErrorCode::usage);
-    EXPECT_EQ(code(mesh, {.code = DetailCode::reference, .error = 0.1}), ErrorCode::usage);
-    EXPECT_EQ(code(mesh, {.code = DetailCode::reference, .references = 5}), ErrorCode::usage);
     EXPECT_EQ(code(Mesh{}, {}), ErrorCode::unsuitable);
-    EXPECT_EQ(code(soup(mesh), {.code = DetailCode::reference}), ErrorCode::unsuitable);
     const RunContext cancelled(1);
     cancelled.cancel();
     const Result<Stripped> result = strip(mesh, {}, cancelled);
@@ -291,5 +287,4 @@ TEST(Strip, VerticesInAnotherOrderComeBackInTheirOwn) {
     Model wrong = model;
     wrong.source_order[0] = wrong.source_order[1];
     EXPECT_NE(check_model(wrong), "");
-    EXPECT_EQ(strip(mesh, {.code = DetailCode::reference, .reorder = true}, kOneThread).error().code, ErrorCode::usage);
 }

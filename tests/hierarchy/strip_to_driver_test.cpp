@@ -65,7 +65,7 @@ TEST(StripToDriver, PosesAreArraysOfTheDriversPositions) {
     Mat3d a;
     a << 1.2, 0.3, -0.1, 0.2, 0.8, 0.4, -0.3, 0.1, 1.1;
     const Deformation moved = affine(a, {1, 2, 3});
-    const Pose pose{deformed(moved, driver.positions), {}, {}};
+    const Pose pose{deformed(moved, driver.positions), {}};
     EXPECT_LT(distance(restored(model, pose), deformed(moved, mesh.positions)).max, 5e-6);
 }
 
@@ -120,7 +120,7 @@ TEST(StripToDriver, CurvedPosesAreFollowed) {
     const Pose pose = warp_pose(*warp, model, kOneThread);
     const auto error = [&](const Pose& at) { return distance(restored(model, at), bent.positions).rms; };
     EXPECT_LT(error(pose), 1e-4);
-    EXPECT_LT(error({pose.positions, {}, {}}), 2.5e-3);
+    EXPECT_LT(error({pose.positions, {}}), 2.5e-3);
 }
 
 TEST(StripToDriver, ThinPartsHangOnTheirOwnSide) {
@@ -131,7 +131,7 @@ TEST(StripToDriver, ThinPartsHangOnTheirOwnSide) {
         // The lower half of the driver goes away; so must the lower half of the mesh, and nothing else.
         std::vector<Vec3f> moved = driver.positions;
         for (std::size_t v = moved.size() / 2; v < moved.size(); ++v) moved[v].z() -= 5;
-        const std::vector<Vec3f> all = restored(result.model, {moved, {}, {}});
+        const std::vector<Vec3f> all = restored(result.model, {moved, {}});
         for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
             const float down = mesh.positions[v].z() - all[v].z();
             EXPECT_NEAR(down, v < mesh.vertex_count() / 2 ? 0.0f : 5.0f, 0.05f) << gap << ' ' << v;
@@ -146,7 +146,7 @@ TEST(StripToDriver, VerticesOfTheDriverMayLieOnTheMesh) {
     const Stripped result = bound(mesh, driver);
     const Deformation warp = bend(1);
     const std::vector<Vec3f> there = deformed(warp, driver.positions);
-    const std::vector<Vec3f> all = restored(result.model, {there, {}, {}}), before = restored(own, {there, {}, {}});
+    const std::vector<Vec3f> all = restored(result.model, {there, {}}), before = restored(own, {there, {}});
     EXPECT_LT(distance(all, before).rms, 2e-3);
 }
 
@@ -178,7 +178,7 @@ TEST(StripToDriver, SameBytesForAnyThreads) {
     FILIGREE_NEEDS_TWO_THREADS();
     const Mesh mesh = make_wavy_sphere({.resolution = 96}), driver = smooth_ball(12);
     const Model one = bound(mesh, driver).model, two = bound(mesh, driver, RunContext(2)).model;
-    const auto &a = std::get<BlendDetail>(one.detail), &b = std::get<BlendDetail>(two.detail);
+    const BlendDetail &a = one.detail, &b = two.detail;
     EXPECT_EQ(a.order, b.order);
     EXPECT_EQ(a.u, b.u);
     EXPECT_EQ(a.v, b.v);

@@ -1,7 +1,5 @@
 // Uses what can be used without OpenGL, and asks for OpenGL.
-#include <filigree/render/camera.h>
-#include <filigree/render/gl_context.h>
-#include <filigree/render/picture.h>
+#include <filigree/render.h>
 
 #include <iostream>
 

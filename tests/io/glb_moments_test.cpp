@@ -51,7 +51,7 @@ float scale_at(const MomentsGlb& glb, std::size_t k, float time) {
 
 TEST(GlbMoments, OneKeyIsShownAtATime) {
     const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "filigree_moments.glb";
-    ASSERT_TRUE(write_glb_moments(8, 24, 8, moment, path, kOneThread).ok()); // frames 0, 3, 6 and the last
+    ASSERT_TRUE(write_glb_moments({8, 24, moment}, 8, path, kOneThread).ok()); // frames 0, 3, 6 and the last
     const MomentsGlb glb(read_file(path).value());
     ASSERT_EQ(glb.json["meshes"].size(), 4u);
     ASSERT_EQ(glb.json["scenes"][0]["nodes"].size(), 4u);
@@ -88,7 +88,7 @@ TEST(GlbMoments, FacesWithoutAMaterialMayComeLater) {
         if (frame == 2) now.mesh.materials.of_face[3] = kNoIndex;
         return now;
     };
-    ASSERT_TRUE(write_glb_moments(3, 24, 24, skinned, path, kOneThread).ok());
+    ASSERT_TRUE(write_glb_moments({3, 24, skinned}, 24, path, kOneThread).ok());
     const MomentsGlb glb(read_file(path).value());
     ASSERT_EQ(glb.json["materials"].size(), 2u);
     EXPECT_EQ(glb.json["materials"][0]["name"], "skin");
@@ -102,14 +102,14 @@ TEST(GlbMoments, FacesWithoutAMaterialMayComeLater) {
 
 TEST(GlbMoments, OneFrameStandsStillAndNoneIsRefused) {
     const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "filigree_moment.glb";
-    ASSERT_TRUE(write_glb_moments(1, 24, 8, moment, path, kOneThread).ok());
+    ASSERT_TRUE(write_glb_moments({1, 24, moment}, 8, path, kOneThread).ok());
     EXPECT_FALSE(MomentsGlb(read_file(path).value()).json.contains("animations"));
     std::filesystem::remove(path);
-    EXPECT_EQ(write_glb_moments(0, 24, 8, moment, path, kOneThread).error().code, ErrorCode::unsuitable);
-    EXPECT_EQ(write_glb_moments(4, 24, 0, moment, path, kOneThread).error().code, ErrorCode::usage);
+    EXPECT_EQ(write_glb_moments({0, 24, moment}, 8, path, kOneThread).error().code, ErrorCode::unsuitable);
+    EXPECT_EQ(write_glb_moments({4, 24, moment}, 0, path, kOneThread).error().code, ErrorCode::usage);
     const RunContext cancelled(1);
     cancelled.cancel();
-    EXPECT_EQ(write_glb_moments(4, 24, 8, moment, path, cancelled).error().code, ErrorCode::cancelled);
+    EXPECT_EQ(write_glb_moments({4, 24, moment}, 8, path, cancelled).error().code, ErrorCode::cancelled);
     EXPECT_FALSE(std::filesystem::exists(path));
 }
 

@@ -60,7 +60,7 @@ protected:
         return json::parse(bytes.substr(20, length));
     }
     ExportReport skin(const Model& model, const PoseSequence& poses, const SkinOptions& options = {}) {
-        const Result<ExportReport> report = write_skin_glb(model, stream_of(poses), options, file(), kAllThreads);
+        const Result<ExportReport> report = write_skin_glb(model, frames_of(poses), options, file(), kAllThreads);
         EXPECT_TRUE(report.ok()) << (report.ok() ? "" : report.error().message);
         return report.ok() ? *report : ExportReport{};
     }
@@ -254,7 +254,7 @@ TEST_F(GltfExport, SaysAboutItselfWhatItMeasured) {
 TEST_F(GltfExport, RefusesWhatItCannotWrite) {
     const Model& model = wavy_model();
     const auto refused = [&](const PoseSequence& poses, const SkinOptions& options) {
-        const Result<ExportReport> report = write_skin_glb(model, stream_of(poses), options, file(), kAllThreads);
+        const Result<ExportReport> report = write_skin_glb(model, frames_of(poses), options, file(), kAllThreads);
         EXPECT_FALSE(report.ok());
         EXPECT_FALSE(fs::exists(file()));
         return report.ok() ? ErrorCode{} : report.error().code;
@@ -270,7 +270,7 @@ TEST_F(GltfExport, RefusesWhatItCannotWrite) {
     EXPECT_EQ(refused(other, {}), ErrorCode::mismatch);
     RunContext cancelled;
     cancelled.cancel();
-    EXPECT_EQ(write_skin_glb(model, stream_of(poses), {}, file(), cancelled).error().code, ErrorCode::cancelled);
+    EXPECT_EQ(write_skin_glb(model, frames_of(poses), {}, file(), cancelled).error().code, ErrorCode::cancelled);
     EXPECT_FALSE(fs::exists(file()));
 }
 
@@ -278,16 +278,16 @@ TEST_F(GltfExport, ADriverThatLeftAsAnAnimationComesBackAsPoses) {
     const Model& model = wavy_model();
     const PoseSequence poses = make_poses(model, 7, 24);
     skin(model, poses, {.restore = {.level = 0}, .full_precision = true});
-    const Result<PoseStream> back =
+    const Result<FrameSource<Pose>> back =
         open_poses(file(), model.driver().vertices.size(), model.mesh.origin, {.frames_per_second = 24}, kAllThreads);
     ASSERT_TRUE(back.ok()) << back.error().message;
     ASSERT_EQ(back->frames, 7u);
     for (const std::size_t frame : {0u, 3u, 6u}) {
-        const Pose pose = back->pose(frame).value();
+        const Pose pose = back->frame(frame).value();
         for (std::size_t i = 0; i < pose.positions.size(); ++i)
             ASSERT_LT((pose.positions[i] - poses.frames[frame].positions[i]).norm(), 1e-6);
     }
-    const Result<PoseStream> other = open_poses(file(), 3, Vec3d::Zero(), {}, kAllThreads);
+    const Result<FrameSource<Pose>> other = open_poses(file(), 3, Vec3d::Zero(), {}, kAllThreads);
     ASSERT_FALSE(other.ok());
     EXPECT_EQ(other.error().code, ErrorCode::mismatch);
 }

@@ -62,7 +62,6 @@ TEST(LosslessModel, EveryKindComesBackByteForByte) {
     expect_same(model, bending(model, 3, false));
     expect_same(strip(sphere, {.base = 40, .precision = Precision::int16}, kTwoThreads)->model, {});
     expect_same(strip(cube, {.base = 30, .reorder = true}, kTwoThreads)->model, {});
-    expect_same(strip(cube, {.code = DetailCode::reference}, kTwoThreads)->model, {});
     for (const Mesh& mesh : {filigree_test::make_vertex_attribute_mesh(), filigree_test::make_corner_attribute_mesh(),
                              filigree_test::make_far_mesh()})
         expect_same(strip(mesh, {.base = 3}, kTwoThreads)->model, {});
@@ -86,7 +85,6 @@ TEST(LosslessModel, SizesStay) {
     expect_coded_size(size_of({.base = 100}, 20), 299992, "with 20 poses");
     expect_coded_size(size_of({.base = 100, .precision = Precision::int16}), 184488, "details of 16 bits");
     expect_coded_size(size_of({.base = 100, .reorder = true}), 343296, "in the order of places");
-    expect_coded_size(size_of({.code = DetailCode::reference}), 377480, "detail against three references");
     mesh.normals.values = vertex_normals(mesh, mesh.positions, kTwoThreads);
     for (const Vec3f& p : mesh.positions) {
         mesh.uvs.values.emplace_back(0.5f + 0.4f * p.x(), 0.5f + 0.4f * p.y() * p.z());

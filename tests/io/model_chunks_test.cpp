@@ -3,6 +3,7 @@
 
 #include "filigree/hierarchy/strip.h"
 #include "filigree/io/model_file.h"
+#include "filigree/io/reference_file.h"
 #include "filigree/mesh/shapes.h"
 #include "threads.h"
 
@@ -56,9 +57,9 @@ protected:
         return ModelChunks::open(*FileReader::open(path("m.fil")), "m.fil", kTwoThreads);
     }
     /// By way of the whole mesh.
-    std::string whole(const PoseSequence& poses, const RestoreOptions& options = {}) {
+    std::string whole(const PoseSequence& poses) {
         const Model model = *read_model(path("m.fil"), kTwoThreads);
-        const Restorer restorer = *Restorer::create(model, options, kTwoThreads);
+        const Restorer restorer = *Restorer::create(model, {}, kTwoThreads);
         const Mesh rest = level_mesh(model, model.finest_level());
         const MeshAnimation animation{&rest, poses.frames.size(), 24, [&](std::size_t frame, std::span<Vec3f> out) {
                                           return restorer.positions(poses.frames[frame], out, kTwoThreads);
@@ -89,14 +90,10 @@ TEST_F(ModelChunksTest, RestoreTheSameBytesAsTheWhole) {
                 EXPECT_EQ(box.min, own.min);
                 EXPECT_EQ(box.max, own.max);
             }
-            for (const RestoreOptions& options :
-                 {RestoreOptions{}, RestoreOptions{.law = HeightLaw::keep, .thin_shell = true}}) {
-                const auto written =
-                    write_restored_chunks(*chunks, stream_of(poses), options, path("chunks.pc2"), kTwoThreads);
-                ASSERT_TRUE(written.ok()) << written.error().message;
-                EXPECT_TRUE(written->empty());
-                EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses, options));
-            }
+            const auto written = write_restored_chunks(*chunks, frames_of(poses), {}, path("chunks.pc2"), kTwoThreads);
+            ASSERT_TRUE(written.ok()) << written.error().message;
+            EXPECT_TRUE(written->empty());
+            EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses));
         }
 }
 
@@ -115,7 +112,7 @@ TEST_F(ModelChunksTest, HaveNoVerticesOfADriverMadeElsewhere) {
             EXPECT_EQ(chunks->vertex_count(), mesh.vertex_count());
             const ModelOutline outline = *read_model_outline(*FileReader::open(path("m.fil")), "m.fil", kTwoThreads);
             EXPECT_EQ(outline.levels.back().vertices, mesh.vertex_count());
-            ASSERT_TRUE(write_restored_chunks(*chunks, stream_of(poses), {}, path("chunks.pc2"), kTwoThreads).ok());
+            ASSERT_TRUE(write_restored_chunks(*chunks, frames_of(poses), {}, path("chunks.pc2"), kTwoThreads).ok());
             EXPECT_EQ(fs::file_size(path("chunks.pc2")), 32 + 3 * 12 * mesh.vertex_count());
             EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses));
         }
@@ -126,7 +123,7 @@ TEST_F(ModelChunksTest, AreSharedByProcesses) {
     const PoseSequence poses = bent_poses(model, false);
     const Result<ModelChunks> chunks = open(model);
     for (std::size_t part = 1; part <= 2; ++part) {
-        const auto report = write_restored_chunks(*chunks, stream_of(poses), {}, path("shared.pc2"),
+        const auto report = write_restored_chunks(*chunks, frames_of(poses), {}, path("shared.pc2"),
                                                   WorkChunk{part, 2, "job"}, kTwoThreads);
         ASSERT_TRUE(report.ok()) << report.error().message;
         EXPECT_EQ(report->is_whole, part == 2);
@@ -137,7 +134,7 @@ TEST_F(ModelChunksTest, AreSharedByProcesses) {
 TEST_F(ModelChunksTest, FarFromTheOriginLostDigitsAreSaid) {
     const Model model = model_of(Precision::float32, {1e6, 0, 0});
     const PoseSequence poses = bent_poses(model, false);
-    const auto written = write_restored_chunks(*open(model), stream_of(poses), {}, path("chunks.pc2"), kTwoThreads);
+    const auto written = write_restored_chunks(*open(model), frames_of(poses), {}, path("chunks.pc2"), kTwoThreads);
     ASSERT_TRUE(written.ok());
     EXPECT_EQ(written->size(), 1u);
     EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses));
@@ -157,23 +154,22 @@ TEST_F(ModelChunksTest, DamageIsSeenWhereItIsRead) {
     ASSERT_TRUE(chunks.ok());
     EXPECT_TRUE(chunks->restorer(0, RunContext()).ok());
     EXPECT_EQ(chunks->restorer(1, RunContext()).error().code, ErrorCode::bad_file);
-    const auto written = write_restored_chunks(*chunks, stream_of(poses), {}, path("c.pc2"), kTwoThreads);
+    const auto written = write_restored_chunks(*chunks, frames_of(poses), {}, path("c.pc2"), kTwoThreads);
     EXPECT_EQ(written.error().code, ErrorCode::bad_file);
     EXPECT_NE(written.error().message.find("mesh.pos"), std::string::npos) << written.error().message;
     EXPECT_FALSE(fs::exists(path("c.pc2")));
 }
 
 TEST_F(ModelChunksTest, WhatHasNoneIsRefused) {
-    const Stripped reference = *strip(make_wavy_cube({.resolution = 8}), {.code = DetailCode::reference}, kTwoThreads);
-    EXPECT_EQ(open(reference.model).error().code, ErrorCode::unsuitable);
-    const auto old =
-        ModelChunks::open(*FileReader::open(FILIGREE_ROOT "/tests/io/version_1/float.fil"), "a", kTwoThreads);
-    EXPECT_EQ(old.error().code, ErrorCode::unsuitable);
+    const std::string reference =
+        write_reference_model(*strip_to_reference(make_wavy_cube({.resolution = 8}), {}, kTwoThreads));
+    EXPECT_EQ(ModelChunks::open(FileReader(std::string_view(reference)), "a", kTwoThreads).error().code,
+              ErrorCode::unsuitable);
     const Model model = model_of(Precision::float32);
     const Result<ModelChunks> chunks = open(model);
     const PoseSequence poses = bent_poses(model, false);
     const auto code = [&](const PoseSequence& given, const RestoreOptions& options, const char* name) {
-        return write_restored_chunks(*chunks, stream_of(given), options, path(name), kTwoThreads).error().code;
+        return write_restored_chunks(*chunks, frames_of(given), options, path(name), kTwoThreads).error().code;
     };
     EXPECT_EQ(code(poses, {.level = 1}, "a.pc2"), ErrorCode::usage);
     EXPECT_EQ(code(poses, {}, "a.mdd"), ErrorCode::usage);
@@ -183,7 +179,7 @@ TEST_F(ModelChunksTest, WhatHasNoneIsRefused) {
     EXPECT_EQ(code(other, {}, "a.pc2"), ErrorCode::mismatch);
     RunContext cancelled(1);
     cancelled.cancel();
-    EXPECT_EQ(write_restored_chunks(*chunks, stream_of(poses), {}, path("a.pc2"), cancelled).error().code,
+    EXPECT_EQ(write_restored_chunks(*chunks, frames_of(poses), {}, path("a.pc2"), cancelled).error().code,
               ErrorCode::cancelled);
     EXPECT_FALSE(fs::exists(path("a.pc2")));
 }

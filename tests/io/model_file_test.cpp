@@ -5,6 +5,7 @@
 #include "filigree/hierarchy/strip.h"
 #include "filigree/io/file.h"
 #include "filigree/io/model_sections.h"
+#include "filigree/io/reference_file.h"
 #include "filigree/mesh/shapes.h"
 #include "io/sample_meshes.h"
 #include "threads.h"
@@ -47,7 +48,6 @@ std::vector<Model> small_models() {
     models.push_back(stripped(decorated, {.base = 9}));
     models.push_back(stripped(decorated, {.base = 9, .precision = Precision::int16}));
     models.push_back(stripped(make_corner_attribute_mesh(), {.base = 4}));
-    models.push_back(stripped(make_wavy_plane({.resolution = 4}), {.code = DetailCode::reference}));
     return models;
 }
 
@@ -170,7 +170,6 @@ TEST(ModelFile, ComesBackToTheByte) {
         const Result<Model> back = read(bytes);
         ASSERT_TRUE(back.ok()) << back.error().message;
         EXPECT_EQ(write_model(*back), bytes);
-        EXPECT_EQ(back->code(), model.code());
         EXPECT_EQ(back->mesh.corners, model.mesh.corners);
         EXPECT_EQ(back->mesh.origin, model.mesh.origin);
         EXPECT_EQ(back->mesh.groups.names, model.mesh.groups.names);
@@ -178,8 +177,7 @@ TEST(ModelFile, ComesBackToTheByte) {
         ASSERT_EQ(back->levels.size(), model.levels.size());
         EXPECT_TRUE(same_bytes(driver_positions(*back), driver_positions(model)));
         EXPECT_TRUE(same_bytes(bent(*back), bent(model)));
-        const auto* blend = std::get_if<BlendDetail>(&model.detail);
-        if (!blend || blend->precision == Precision::float32) {
+        if (model.detail.precision == Precision::float32) {
             EXPECT_TRUE(same_bytes(back->mesh.positions, model.mesh.positions));
         }
     }
@@ -192,7 +190,7 @@ TEST(ModelFile, Int16IsHalfTheBytesAndCloseToTheMesh) {
     EXPECT_LT(write_model(rounded).size(), write_model(exact).size());
     const Result<Model> back = read(write_model(rounded));
     ASSERT_TRUE(back.ok());
-    const auto& detail = std::get<BlendDetail>(back->detail);
+    const BlendDetail& detail = back->detail;
     for (std::size_t c = 0; c < detail.cells.size(); ++c)
         for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
             const Vec3f off = back->mesh.positions[detail.order[r]] - mesh.positions[detail.order[r]];
@@ -314,8 +312,7 @@ TEST(ModelFile, NothingMissingIsRestored) {
 }
 
 TEST(ModelFile, HostileNumbers) {
-    const std::string blend = write_model(small_models()[0]), rounded = write_model(small_models()[1]),
-                      reference = write_model(small_models()[3]);
+    const std::string blend = write_model(small_models()[0]), rounded = write_model(small_models()[1]);
     const auto refuses = [](const std::string& bytes, std::string_view name, auto value, std::size_t item = 1) {
         Patcher patcher(bytes);
         patcher.set(name, item, value);
@@ -347,12 +344,6 @@ TEST(ModelFile, HostileNumbers) {
     refuses(rounded, "mesh.num", std::uint64_t{48}, 0);
     refuses(rounded, "bl.prec", 0u, 0);
     refuses(rounded, "bl.u16", std::int16_t{-32768});
-
-    for (const char* name : {"rf.base", "rf.grid"})
-        for (const Index id : {25u, kNoIndex}) refuses(reference, name, id);
-    for (const std::uint32_t x : {0u, 1u, 17u, 0xffffffffu}) refuses(reference, "rf.par", x, 0);
-    refuses(reference, "rf.par", 5u, 1);
-    for (const char* name : {"rf.ext", "rf.drv", "rf.rec"}) refuses(reference, name, NAN, 0);
 }
 
 TEST(ModelFile, ADriverSectionInAFloatModelIsNoReasonToReadPastItsEnd) {
@@ -436,7 +427,7 @@ TEST(ModelFile, ManyChunksComeBack) {
         const std::string bytes = write_model(written);
         const Result<Model> model = read(bytes);
         ASSERT_TRUE(model.ok()) << model.error().message;
-        EXPECT_TRUE(same_detail(std::get<BlendDetail>(model->detail), std::get<BlendDetail>(written.detail)));
+        EXPECT_TRUE(same_detail(model->detail, written.detail));
         EXPECT_EQ(write_model(*model), bytes);
         const FileReader file{std::string_view(bytes)};
         for (unsigned k = 0; k <= model->finest_level(); ++k)
@@ -444,29 +435,48 @@ TEST(ModelFile, ManyChunksComeBack) {
     }
 }
 
-TEST(ModelFile, VersionOneIsRead) {
-    const auto model_of = [](const std::string& name) {
-        Result<Model> model = read_model(FILIGREE_ROOT "/tests/io/version_1/" + name, kOneThread);
-        EXPECT_TRUE(model.ok()) << model.error().message;
-        return std::move(*model);
+/// A file of the reference code: the same mesh and levels, and detail that read_model does not take.
+TEST(ModelFile, ReferenceModelsHaveTheirOwnReader) {
+    const ReferenceModel model = *strip_to_reference(make_wavy_plane({.resolution = 4}), {}, kOneThread);
+    const std::string bytes = write_reference_model(model);
+    const FileReader file{std::string_view(bytes)};
+    const auto again = [](const std::string& given) {
+        return read_reference_model(FileReader(std::string_view(given)), "it", kOneThread);
     };
-    const Mesh plane = make_wavy_plane({.resolution = 6});
-    for (const char* name : {"float.fil", "int16.fil"}) {
-        const Model model = model_of(name);
-        ASSERT_EQ(model.mesh.vertex_count(), plane.vertex_count());
-        EXPECT_EQ(model.driver().vertices.size(), 9u);
-        const std::vector<Vec3f> restored =
-            *Restorer::create(model, {}, kOneThread)->positions(rest_pose(model), kOneThread);
-        for (std::size_t v = 0; v < restored.size(); ++v)
-            EXPECT_LT((restored[v] - plane.positions[v]).norm(), 2e-5f) << name << ' ' << v;
-        const FileReader file = *FileReader::open(FILIGREE_ROOT "/tests/io/version_1/" + std::string(name));
-        EXPECT_TRUE(same_mesh(*read_model_level(file, 0, name, kOneThread), level_mesh(model, 0)));
-        EXPECT_EQ(read_model_outline(file, name, kOneThread)->levels[0].vertices, 9u);
-        // written anew it is of today's version, and the same
-        const Model again = *read(write_model(model));
-        EXPECT_TRUE(same_detail(std::get<BlendDetail>(model.detail), std::get<BlendDetail>(again.detail)));
+    EXPECT_EQ(write_reference_model(*again(bytes)), bytes);
+    const Error refused = read(bytes).error();
+    EXPECT_EQ(refused.code, ErrorCode::unsuitable);
+    EXPECT_NE(refused.message.find("reference code"), std::string::npos) << refused.message;
+    EXPECT_EQ(again(write_model(small_models()[0])).error().code, ErrorCode::unsuitable);
+
+    const ModelOutline outline = *read_model_outline(file, "it", kOneThread);
+    EXPECT_EQ(outline.references, 3u);
+    EXPECT_EQ(outline.patches, model.detail.patches.patch_count());
+    ASSERT_EQ(outline.levels.size(), model.finest_level() + 1);
+    for (unsigned k = 0; k <= model.finest_level(); ++k) {
+        EXPECT_EQ(outline.levels[k].vertices, level_mesh(model, k).vertex_count());
+        EXPECT_TRUE(same_mesh(*read_model_level(file, k, "it", kOneThread), level_mesh(model, k))) << k;
     }
-    EXPECT_EQ(model_of("reference.fil").code(), DetailCode::reference);
+
+    const auto refuses = [&](std::string_view name, auto value, std::size_t item = 1) {
+        Patcher patcher(bytes);
+        patcher.set(name, item, value);
+        EXPECT_FALSE(again(patcher.bytes()).ok()) << name;
+    };
+    for (const char* name : {"rf.base", "rf.grid"})
+        for (const Index id : {25u, kNoIndex}) refuses(name, id);
+    for (const std::uint32_t x : {0u, 1u, 17u, 0xffffffffu}) refuses("rf.par", x, 0);
+    refuses("rf.par", 5u, 1);
+    for (const char* name : {"rf.ext", "rf.drv", "rf.rec"}) refuses(name, NAN, 0);
+    for (std::size_t end = 0; end < bytes.size(); end += 37) EXPECT_FALSE(again(bytes.substr(0, end)).ok()) << end;
+    for (std::size_t k = 0; k < bytes.size(); k += 11) {
+        std::string damaged = bytes;
+        damaged[k] = char(damaged[k] ^ 4);
+        const Result<ReferenceModel> found = again(damaged);
+        if (found.ok()) {
+            EXPECT_EQ(check_model(*found), "") << k;
+        }
+    }
 }
 
 TEST(ModelFile, ALevelIsReadAlone) {
@@ -486,11 +496,11 @@ TEST(ModelFile, ALevelIsReadAlone) {
 TEST(ModelFile, AnOutlineSaysWhatTheModelIs) {
     for (const Model& model : small_models()) {
         PoseSequence poses{25, {}};
-        if (model.code() == DetailCode::blend) poses.frames.assign(3, rest_pose(model));
+        poses.frames.assign(3, rest_pose(model));
         const std::string bytes = write_model(model, poses);
         const Result<ModelOutline> outline = read_model_outline(FileReader(bytes), "a.fil", kOneThread);
         ASSERT_TRUE(outline.ok()) << outline.error().message;
-        EXPECT_EQ(outline->code, model.code());
+        EXPECT_EQ(outline->references, 0u);
         ASSERT_EQ(outline->levels.size(), model.finest_level() + 1);
         for (unsigned k = 0; k <= model.finest_level(); ++k) {
             EXPECT_EQ(outline->levels[k].vertices, level_counts(model, k).vertices);
@@ -500,13 +510,8 @@ TEST(ModelFile, AnOutlineSaysWhatTheModelIs) {
         EXPECT_EQ(outline->bytes, bytes.size());
         EXPECT_EQ(outline->frames, poses.frames.size());
         EXPECT_EQ(outline->frames_per_second, poses.frames.empty() ? 0 : 25);
-        if (const auto* detail = std::get_if<BlendDetail>(&model.detail)) {
-            EXPECT_EQ(outline->precision, detail->precision);
-            EXPECT_EQ(outline->facing_away, detail->facing_away);
-        } else {
-            EXPECT_EQ(outline->references, std::get<ReferenceDetail>(model.detail).references);
-            EXPECT_EQ(outline->patches, std::get<ReferenceDetail>(model.detail).patches.patch_count());
-        }
+        EXPECT_EQ(outline->precision, model.detail.precision);
+        EXPECT_EQ(outline->facing_away, model.detail.facing_away);
     }
 }
 

@@ -31,7 +31,7 @@ PoseSequence turning(const Model& model, std::size_t frames) {
     return poses;
 }
 
-std::string stream_of(const Model& model, const PoseSequence& poses) {
+std::string frames_of(const Model& model, const PoseSequence& poses) {
     std::string name = (std::filesystem::temp_directory_path() / "filigree-stream-XXXXXX").string();
     const std::filesystem::path folder = ::mkdtemp(name.data()), path = folder / "stream.fil";
     write_coded_model(model, poses, {.levels = true}, path, kTwoThreads).value();
@@ -44,7 +44,7 @@ std::string stream_of(const Model& model, const PoseSequence& poses) {
 
 TEST(ModelStream, BetterWithEveryLevel) {
     const Model model = wavy_model();
-    const std::string bytes = stream_of(model, {});
+    const std::string bytes = frames_of(model, {});
     const ModelOutline outline = read_model_outline(FileReader(bytes), "it", kTwoThreads).value();
     const std::vector<CodedLevelMark>& marks = outline.coding->levels;
     ASSERT_GE(marks.size(), 4u);
@@ -71,7 +71,7 @@ TEST(ModelStream, BetterWithEveryLevel) {
 TEST(ModelStream, TheWholeFileIsAModelWithItsPoses) {
     const Model model = wavy_model();
     const PoseSequence poses = turning(model, 300); // more than a block
-    const std::string bytes = stream_of(model, poses);
+    const std::string bytes = frames_of(model, poses);
     const Model back = read_model(bytes, "it", kTwoThreads).value();
     EXPECT_EQ(back.mesh.face_count(), model.mesh.face_count());
     EXPECT_EQ(back.driver().vertices.size(), model.driver().vertices.size());
@@ -104,7 +104,7 @@ TEST(ModelStream, LevelsHaveTexturesMaterialsAndColours) {
         material.picture_bytes = std::make_shared<const std::string>(5000, 'p');
     }
     const Model model = strip(mesh, {.base = 200}, kTwoThreads)->model;
-    const std::string bytes = stream_of(model, {});
+    const std::string bytes = frames_of(model, {});
     ModelStream stream("it");
     for (const char byte : bytes) {
         ASSERT_TRUE(stream.feed(std::string_view(&byte, 1)).ok());
@@ -135,7 +135,7 @@ TEST(ModelStream, OtherFilesAndDamageAreNamed) {
     EXPECT_EQ(plain.feed(write_model(model)).error().code, ErrorCode::unsuitable);
     ModelStream text("it.txt");
     EXPECT_EQ(text.feed(std::string(100, 'x')).error().code, ErrorCode::bad_file);
-    const std::string bytes = stream_of(model, {});
+    const std::string bytes = frames_of(model, {});
     for (std::size_t at = 0; at < bytes.size(); at += 11) {
         std::string damaged = bytes;
         damaged[at] = char(damaged[at] ^ 0x41);

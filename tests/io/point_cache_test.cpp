@@ -141,7 +141,7 @@ TEST_F(PointCache, EveryFormatComesBackToTheBit) {
             EXPECT_TRUE(frame_of(*back, frame) == frame_of(moving(mesh_, kFrames), frame));
         const auto poses = open_poses(path(name), mesh_.vertex_count(), mesh_.origin, {}, kOneThread);
         ASSERT_TRUE(poses.ok());
-        const Result<Pose> pose = poses->pose(3);
+        const Result<Pose> pose = poses->frame(3);
         ASSERT_TRUE(pose.ok());
         EXPECT_TRUE(pose->positions == frame_of(moving(mesh_, kFrames), 3));
         EXPECT_TRUE(pose->gradients.empty());
@@ -237,13 +237,13 @@ TEST_F(PointCache, NumbersThatAreNotFiniteAreFoundWhenTheirFrameIs) {
     put("a.pc2", std::string("POINTCACHE2\0", 12) + little({1, 2}) + floats({0, 1}) + little({2}) + good + bad);
     const auto poses = open_poses(path("a.pc2"), 2, Vec3d::Zero(), {}, kOneThread);
     ASSERT_TRUE(poses.ok());
-    EXPECT_TRUE(poses->pose(0).ok());
-    ASSERT_FALSE(poses->pose(1).ok());
-    says(poses->pose(1).error(), ErrorCode::bad_file, {"a.pc2", "frame 2", "point 1"});
+    EXPECT_TRUE(poses->frame(0).ok());
+    ASSERT_FALSE(poses->frame(1).ok());
+    says(poses->frame(1).error(), ErrorCode::bad_file, {"a.pc2", "frame 2", "point 1"});
     // cut off after it was opened
     ASSERT_EQ(::truncate(path("a.pc2").c_str(), 70), 0);
-    EXPECT_TRUE(poses->pose(0).ok());
-    says(poses->pose(1).error(), ErrorCode::bad_file, {"cut off"});
+    EXPECT_TRUE(poses->frame(0).ok());
+    says(poses->frame(1).error(), ErrorCode::bad_file, {"cut off"});
 }
 
 TEST_F(PointCache, OnlyFilesAreOpened) {
@@ -283,7 +283,7 @@ TEST_F(PointCache, NumberedMeshesMustBeWhole) {
 
 TEST_F(PointCache, NumberedPlyGivesGradients) {
     Mesh mesh = filigree_test::make_plain_mesh();
-    Pose pose{mesh.positions, {}, {}};
+    Pose pose{mesh.positions, {}};
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
         pose.gradients.push_back((Mat3f() << 1, float(v), 2, 3, 4, 5, 6, 7, 8).finished());
     const auto with_gradients = [&](std::size_t frame) -> Result<Mesh> {
@@ -291,11 +291,11 @@ TEST_F(PointCache, NumberedPlyGivesGradients) {
         if (frame != 2) add_gradients(moved, pose);
         return moved;
     };
-    ASSERT_TRUE(write_numbered_meshes(3, with_gradients, path("g/"), kOneThread).ok());
+    ASSERT_TRUE(write_numbered_meshes({3, 60, with_gradients}, path("g/"), kOneThread).ok());
     const auto poses = open_poses(path("g"), mesh.vertex_count(), Vec3d::Zero(), {}, kOneThread);
     ASSERT_TRUE(poses.ok());
-    EXPECT_TRUE(poses->pose(1)->gradients == pose.gradients);
-    says(poses->pose(2).error(), ErrorCode::mismatch, {"g_0003.ply", "no gradients"});
+    EXPECT_TRUE(poses->frame(1)->gradients == pose.gradients);
+    says(poses->frame(2).error(), ErrorCode::mismatch, {"g_0003.ply", "no gradients"});
 }
 
 TEST_F(PointCache, NumberedMeshesOfOneFolderComeTogetherOrNotAtAll) {
@@ -306,14 +306,14 @@ TEST_F(PointCache, NumberedMeshesOfOneFolderComeTogetherOrNotAtAll) {
         moved.positions[0].x() = frame == broken ? std::nanf("") : float(frame);
         return Result<Mesh>(moved);
     };
-    const std::vector<NumberedMeshes> parts = {{{path("both"), "a#1_", ".ply"}, frame_of},
-                                               {{path("both"), "b_", ".ply"}, frame_of}};
-    ASSERT_TRUE(write_numbered_meshes(3, parts, kOneThread).ok());
+    const std::vector<NumberedMeshes> parts = {{{path("both"), "a#1_", ".ply"}, {3, 60, frame_of}},
+                                               {{path("both"), "b_", ".ply"}, {3, 60, frame_of}}};
+    ASSERT_TRUE(write_numbered_meshes(parts, kOneThread).ok());
     EXPECT_TRUE(fs::exists(path("both/a#1_0003.ply"))); // the name is known: no '#' stands for a number
     EXPECT_TRUE(fs::exists(path("both/b_0003.ply")));
     const std::string before = read_file(path("both/a#1_0002.ply")).value();
     broken = 2;
-    says(write_numbered_meshes(3, parts, kOneThread).error(), ErrorCode::unsuitable, {"a#1_0003.ply"});
+    says(write_numbered_meshes(parts, kOneThread).error(), ErrorCode::unsuitable, {"a#1_0003.ply"});
     EXPECT_EQ(read_file(path("both/a#1_0002.ply")).value(), before);
 }
 
@@ -343,7 +343,7 @@ TEST_F(PointCache, ModelsPosesAreAnAnimationToo) {
     ASSERT_TRUE(stream.ok());
     EXPECT_EQ(stream->frames_per_second, 24);
     EXPECT_EQ(stream->frames, 2u);
-    EXPECT_EQ(stream->pose(1)->gradients.size(), points);
+    EXPECT_EQ(stream->frame(1)->gradients.size(), points);
     refuses(path("m.fil"), points + 1, ErrorCode::mismatch, {"another model"});
     refuses(path("still.fil"), points, ErrorCode::unsuitable, {"no poses"});
 }
@@ -404,10 +404,10 @@ TEST_F(PointCache, PipesInASequenceAreRefused) {
     ASSERT_TRUE(poses.ok());
     fs::remove(path("n/m_0002.ply"));
     ASSERT_EQ(::mkfifo(path("n/m_0002.ply").c_str(), 0600), 0);
-    says(poses->pose(1).error(), ErrorCode::unsupported, {"m_0002.ply", "pipe"}); // and does not wait for a writer
+    says(poses->frame(1).error(), ErrorCode::unsupported, {"m_0002.ply", "pipe"}); // and does not wait for a writer
     fs::rename(path("n/m_0001.ply"), path("elsewhere.ply"));
     fs::create_symlink(path("elsewhere.ply"), path("n/m_0001.ply"));
-    EXPECT_TRUE(poses->pose(0).ok()); // links are followed
+    EXPECT_TRUE(poses->frame(0).ok()); // links are followed
 }
 
 TEST_F(PointCache, NumberedMeshesReplaceFilesAllOrNone) {
@@ -512,12 +512,12 @@ TEST_F(PointCache, AClipOfGltfBeginsAtNoughtAndHoldsItsFirstKey) {
         const auto poses = open_poses(clip(channel, output), 3, Vec3d::Zero(), {.frames_per_second = 10}, kOneThread);
         ASSERT_TRUE(poses.ok()) << poses.error().message;
         EXPECT_EQ(poses->frames, 26u) << channel;
-        const std::vector<Vec3f> held = poses->pose(15)->positions;
-        EXPECT_EQ(poses->pose(0)->positions, held) << channel;
-        EXPECT_NE(poses->pose(20)->positions, held) << channel;
+        const std::vector<Vec3f> held = poses->frame(15)->positions;
+        EXPECT_EQ(poses->frame(0)->positions, held) << channel;
+        EXPECT_NE(poses->frame(20)->positions, held) << channel;
     }
     EXPECT_EQ(open_poses(clip("translation", "2"), 3, Vec3d::Zero(), {.frames_per_second = 10}, kOneThread)
-                  ->pose(20)
+                  ->frame(20)
                   ->positions[0],
               Vec3f(1.5f, 0, 0));
 }

@@ -63,8 +63,8 @@ protected:
         EXPECT_TRUE(write_file(folder_ / name, bytes).ok());
         return (folder_ / name).string();
     }
-    Result<PoseStream> open(const std::string& path, std::vector<std::string>& warnings,
-                            std::optional<UpAxis> up = {}) const {
+    Result<FrameSource<Pose>> open(const std::string& path, std::vector<std::string>& warnings,
+                                   std::optional<UpAxis> up = {}) const {
         return open_poses(path, rest_.size(), Vec3d::Zero(),
                           {.frames_per_second = 10, .animation = {}, .up = up, .rest = rest_, .warnings = &warnings},
                           kOneThread);
@@ -164,8 +164,8 @@ TEST_F(CageFiles, AnimatedGlbWithSplitVerticesMovesTheDriver) {
     std::vector<std::string> warnings;
     const auto poses = open(scene(""), warnings);
     ASSERT_TRUE(poses.ok()) << poses.error().message;
-    EXPECT_EQ(poses->pose(0)->positions, rest_);
-    EXPECT_EQ(poses->pose(10)->positions[3], Vec3f(1, 2, 4));
+    EXPECT_EQ(poses->frame(0)->positions, rest_);
+    EXPECT_EQ(poses->frame(10)->positions[3], Vec3f(1, 2, 4));
     ASSERT_EQ(warnings.size(), 1u);
     EXPECT_NE(warnings[0].find("6 vertices were split"), std::string::npos) << warnings[0];
     rest_[0].x() = -4; // another cage
@@ -184,8 +184,8 @@ TEST_F(CageFiles, NumberedMeshesWithSplitVerticesMoveTheDriver) {
     std::vector<std::string> warnings;
     const auto poses = open((folder_ / "cage_####.obj").string(), warnings);
     ASSERT_TRUE(poses.ok()) << poses.error().message;
-    EXPECT_EQ(poses->pose(0)->positions, rest_);
-    EXPECT_EQ(poses->pose(1)->positions[2], Vec3f(0, 2, 1));
+    EXPECT_EQ(poses->frame(0)->positions, rest_);
+    EXPECT_EQ(poses->frame(1)->positions[2], Vec3f(0, 2, 1));
     EXPECT_EQ(warnings.size(), 1u);
 }
 
@@ -211,7 +211,7 @@ TEST_F(CageFiles, ACacheThatLiesOnItsFaceIsToldOfAndTurnedBack) {
         warnings.clear();
         const auto back = open(z_up, warnings, UpAxis::z);
         EXPECT_TRUE(warnings.empty());
-        EXPECT_EQ(back->pose(0)->positions, rest_);
+        EXPECT_EQ(back->frame(0)->positions, rest_);
     }
     std::vector<std::string> warnings;
     ASSERT_TRUE(open(save(turned(rest_, 1), "y.pc2"), warnings).ok());

@@ -109,7 +109,7 @@ TEST(Usd, FarFromTheOriginNoDigitIsLost) {
         return now;
     };
     std::vector<std::string> warnings;
-    ASSERT_TRUE(write_usda_moments(2, 24, moment, path, warnings, kAllThreads).ok());
+    ASSERT_TRUE(write_usda_moments({2, 24, moment}, path, warnings, kAllThreads).ok());
     text = read_file(path).value();
     std::filesystem::remove(path);
     EXPECT_NE(text.find(placed), std::string::npos);
@@ -135,7 +135,7 @@ TEST(Usd, FacesMayChangeInTime) {
     };
     const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "filigree_usd_moments.usda";
     std::vector<std::string> warnings;
-    ASSERT_TRUE(write_usda_moments(2, 24, moment, path, warnings, kAllThreads).ok());
+    ASSERT_TRUE(write_usda_moments({2, 24, moment}, path, warnings, kAllThreads).ok());
     const std::string text = read_file(path).value();
     EXPECT_EQ(std::count(text.begin(), text.end(), '{'), std::count(text.begin(), text.end(), '}'));
     const auto sample = [&](const std::string& attribute, std::size_t frame) {
@@ -155,7 +155,7 @@ TEST(Usd, FacesMayChangeInTime) {
 
     // Whole or not at all, and nothing beside it.
     const auto fails = [&](std::size_t frames, const std::function<Result<MeshMoment>(std::size_t)>& given) {
-        return write_usda_moments(frames, 24, given, path, warnings, kAllThreads).error().code;
+        return write_usda_moments({frames, 24, given}, path, warnings, kAllThreads).error().code;
     };
     EXPECT_EQ(fails(0, moment), ErrorCode::unsuitable);
     EXPECT_EQ(fails(3,

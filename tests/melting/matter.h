@@ -3,7 +3,7 @@
 
 #include "filigree/core/random.h"
 #include "filigree/mesh/topology.h"
-#include "filigree/physics/matter_particles.h"
+#include "filigree/physics/simulation.h"
 
 #include <gtest/gtest.h>
 

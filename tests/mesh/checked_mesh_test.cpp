@@ -1,6 +1,6 @@
 // Public calls of the layer look at the meshes they are given.
 #include "broken_meshes.h"
-#include "filigree/mesh/incidence.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/regular_patches.h"

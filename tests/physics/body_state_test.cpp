@@ -1,5 +1,6 @@
 #include "filigree/physics/body/body_state.h"
 
+#include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/step/external_forces.h"
 #include "threads.h"
 

@@ -3,6 +3,7 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/shapes.h"
+#include "filigree/physics/body/make_cells.h"
 #include "io/corpus.h"
 #include "threads.h"
 

@@ -1,6 +1,7 @@
 // The fem material against a plain double version of its formulas, and against theory.
 #include "filigree/core/dense_solve.h"
 #include "filigree/physics/body.h"
+#include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/fem/cell_kernel.h"
 #include "threads.h"
 

@@ -1,8 +1,9 @@
-#include "filigree/physics/cells.h"
+#include "filigree/physics/body.h"
 
 #include "filigree/core/random.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/shapes.h"
+#include "filigree/physics/body/make_cells.h"
 #include "io/corpus.h"
 #include "threads.h"
 

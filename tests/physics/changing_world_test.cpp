@@ -16,7 +16,7 @@ const std::vector<MaterialModel> kAllModels = {MaterialModel::fem, MaterialModel
 std::shared_ptr<const Fracture> in_halves(std::shared_ptr<const Body> whole, double strength) {
     auto fracture = std::make_shared<Fracture>();
     const Partition partition{2, [](const Vec3d& point) { return Index(point.x() > 0.2); }};
-    fracture->body = std::make_shared<const BrokenBody>(break_body(std::move(whole), partition, kOneThread).value());
+    fracture->body = break_body(std::move(whole), partition, kOneThread).value();
     fracture->material.strength = strength;
     fracture->material.energy = 1;
     return fracture;

@@ -1,7 +1,7 @@
 // Public calls of the layer look at the meshes they are given.
 #include "broken_meshes.h"
 #include "filigree/physics/body.h"
-#include "filigree/physics/distance_field.h"
+#include "filigree/physics/body/make_cells.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,6 @@
 // What contacts ask of many boxes or particles at once gives what asking one by one gives.
 #include "filigree/core/random.h"
+#include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/contact/box_sweep.h"
 #include "filigree/physics/contact/cell_normals.h"
 #include "filigree/physics/contact/extremes_kernel.h"

@@ -1,6 +1,6 @@
 // Friction, restitution and energy of elastic bodies that touch obstacles and each other.
 #include "filigree/mesh/shapes.h"
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/material.h"
 #include "physics/test_bodies.h"
 #include "simulation_scenes.h"
 #include "threads.h"

@@ -1,10 +1,11 @@
-#include "filigree/physics/distance_field.h"
+#include "filigree/physics/body.h"
 
 #include "filigree/core/random.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/sample/inside_test.h"
+#include "filigree/sample.h"
+#include "filigree/sample/closure.h"
 #include "io/corpus.h"
 #include "threads.h"
 

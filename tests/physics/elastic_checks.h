@@ -5,6 +5,7 @@
 #include "filigree/core/random.h"
 #include "filigree/physics/body.h"
 #include "filigree/physics/body/elasticity.h"
+#include "filigree/physics/body/make_cells.h"
 
 #include <algorithm>
 #include <cmath>

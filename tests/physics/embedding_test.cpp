@@ -1,7 +1,8 @@
-#include "filigree/physics/embedding.h"
+#include "filigree/physics/body.h"
 
 #include "filigree/core/random.h"
-#include "filigree/physics/body.h"
+#include "filigree/physics/body/embedding.h"
+#include "filigree/physics/body/make_cells.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

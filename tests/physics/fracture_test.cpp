@@ -1,6 +1,7 @@
 // Bodies that break: what holds pieces, when it lets go, and what is kept.
 #include "filigree/core/random.h"
 #include "filigree/mesh/shapes.h"
+#include "filigree/physics/breaking/broken_body.h"
 #include "filigree/physics/body/elasticity.h"
 #include "filigree/physics/simulation.h"
 #include "test_bodies.h"
@@ -37,7 +38,7 @@ std::shared_ptr<Fracture> fracture_of(std::shared_ptr<const Body> whole, Partiti
                                       double energy) {
     auto fracture = std::make_shared<Fracture>();
     fracture->body =
-        std::make_shared<const BrokenBody>(break_body(std::move(whole), std::move(partition), kTwoThreads).value());
+        break_body(std::move(whole), std::move(partition), kTwoThreads).value();
     fracture->material.strength = strength;
     fracture->material.energy = energy;
     return fracture;
@@ -69,7 +70,8 @@ TEST(BrokenBody, PointsOfPiecesThatAreNotThereGoWithThoseTheyLieIn) {
 TEST(BrokenBody, PiecesAreTheWhole) {
     const auto whole = block(6, 5, 4, 0.1, brittle());
     BrokenBodyReport report;
-    const BrokenBody broken = break_body(whole, halves({0.013, 0, 0}, {1, 0.3, 0.2}), kTwoThreads, &report).value();
+    const auto kept = break_body(whole, halves({0.013, 0, 0}, {1, 0.3, 0.2}), kTwoThreads, &report).value();
+    const BrokenBody& broken = *kept;
     ASSERT_EQ(broken.pieces.size(), 2u);
     // Masses of the copies add up to each corner's.
     for (Index corner = 0; corner < whole->mass.size(); ++corner) {

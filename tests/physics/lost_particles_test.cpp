@@ -1,4 +1,5 @@
 // What is not finite goes back to where it belongs.
+#include "filigree/physics/body/make_cells.h"
 #include "physics/simulation_scenes.h"
 #include "physics/test_bodies.h"
 

@@ -2,6 +2,7 @@
 
 #include "filigree/core/random.h"
 #include "filigree/mesh/shapes.h"
+#include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/contact/cell_boxes.h"
 #include "filigree/physics/contact/own_cells.h"
 #include "filigree/physics/rigid/rigid_body.h"

@@ -2,6 +2,7 @@
 #include "filigree/core/random.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/physics/body/body_state.h"
+#include "filigree/physics/body/make_cells.h"
 #include "physics/test_bodies.h"
 #include "threads.h"
 

@@ -1,4 +1,5 @@
 #include "filigree/core/dense_solve.h"
+#include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/fem/plasticity.h"
 #include "filigree/physics/meshfree/mls_neighbours.h"
 

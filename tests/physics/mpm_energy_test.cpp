@@ -1,5 +1,6 @@
 // Energy of matter of mpm that hits something never grows, and what is not finite is mended.
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/body/make_cells.h"
+#include "filigree/physics/material.h"
 #include "filigree/physics/simulation.h"
 #include "threads.h"
 

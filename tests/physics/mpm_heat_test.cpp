@@ -1,4 +1,5 @@
 // Heat that is given to bodies of mpm is heat that they gain, however slowly it comes.
+#include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/simulation.h"
 #include "threads.h"
 

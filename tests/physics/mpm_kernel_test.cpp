@@ -1,7 +1,7 @@
 // The loops between particles and nodes: what they keep, and the same bytes in every vector width.
 #include "filigree/core/random.h"
 #include "filigree/physics/grid/mpm_kernel.h"
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/material.h"
 
 #include <gtest/gtest.h>
 

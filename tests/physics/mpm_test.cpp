@@ -1,5 +1,6 @@
 // Bodies of the model mpm against what theory says of them.
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/body/make_cells.h"
+#include "filigree/physics/material.h"
 #include "filigree/physics/simulation.h"
 #include "threads.h"
 

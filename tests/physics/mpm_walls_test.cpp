@@ -1,6 +1,7 @@
 // Matter of mpm against what is thinner than its grid: sheets, thin boxes, trays, rooms, tunnels.
-#include "filigree/physics/grid_limits.h"
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/body/make_cells.h"
+#include "filigree/physics/grid/grid_limits.h"
+#include "filigree/physics/material.h"
 #include "physics/obstacle_meshes.h"
 #include "threads.h"
 

@@ -1,7 +1,8 @@
-#include "filigree/physics/own_weight.h"
+#include "filigree/physics/body/own_weight.h"
 
 #include "filigree/mesh/shapes.h"
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/body/make_cells.h"
+#include "filigree/physics/material.h"
 #include "filigree/physics/simulation.h"
 #include "threads.h"
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/core/dense_solve.h"
+#include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/simulation.h"
 
 #include <gtest/gtest.h>

@@ -2,7 +2,8 @@
 
 #include "filigree/core/random.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/body/make_cells.h"
+#include "filigree/physics/material.h"
 #include "physics/simulation_scenes.h"
 #include "physics/test_bodies.h"
 #include "threads.h"

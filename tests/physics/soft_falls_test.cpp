@@ -2,7 +2,7 @@
 // scans: bench/soft_falls.cpp.
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/material.h"
 #include "filigree/physics/simulation.h"
 #include "io/corpus.h"
 

@@ -1,5 +1,6 @@
 #include "filigree/physics/body/elasticity.h"
 
+#include "filigree/physics/body/make_cells.h"
 #include "physics/elastic_checks.h"
 #include "threads.h"
 

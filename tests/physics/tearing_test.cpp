@@ -31,7 +31,7 @@ std::shared_ptr<Fracture> tearing(std::shared_ptr<const Body> whole, std::vector
                         }};
     auto fracture = std::make_shared<Fracture>();
     fracture->body =
-        std::make_shared<const BrokenBody>(break_body(std::move(whole), std::move(partition), kTwoThreads).value());
+        break_body(std::move(whole), std::move(partition), kTwoThreads).value();
     fracture->material.strength = 1e5; // not reached
     fracture->material.energy = 5;
     fracture->material.plastic_opening = opening;

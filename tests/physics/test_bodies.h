@@ -1,6 +1,7 @@
 // Bodies that several tests put into worlds, and where they are.
 #pragma once
 
+#include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/simulation.h"
 
 namespace filigree {

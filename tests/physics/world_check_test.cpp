@@ -1,5 +1,6 @@
 #include "filigree/physics/simulation.h"
 
+#include "filigree/physics/body/make_cells.h"
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -60,7 +60,7 @@ TEST(LevelShape, KnowsWhichOfItsVerticesAFinestOneIs) {
 TEST(LevelShape, IsPickedWhereTheRayMeetsIt) {
     const auto model = cube_model();
     const auto shape = LevelShape::make(model, {}, 0, kAllThreads).value();
-    const std::vector<Vec3f> positions = shape->positions({driver_positions(*model), {}, {}}, kAllThreads);
+    const std::vector<Vec3f> positions = shape->positions({driver_positions(*model), {}}, kAllThreads);
     ASSERT_EQ(positions.size(), shape->vertex_count());
     const Camera::Ray ray{Vec3d(100, 0, 9), Vec3d(0, 0, -1)};
     const std::optional<Picked> front = shape->pick(positions, ray, {});

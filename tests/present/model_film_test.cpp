@@ -2,7 +2,7 @@
 
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/render/gl_context.h"
+#include "filigree/render.h"
 
 #include <filesystem>
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ TEST(ModelFilm, DrawsAPictureAPose) {
     film.passes = 1;
     const CameraPoints points{cube.positions, cube.origin};
     film.camera = fit_camera(std::span(&points, 1), view_direction(View::iso, film.up), up_vector(film.up), 4.0 / 3);
-    film.poses = {30, {3, Pose{driver_positions(*film.model), {}, {}}}};
+    film.poses = {30, {3, Pose{driver_positions(*film.model), {}}}};
     EXPECT_EQ(film_model(film, folder / "at_%02d.png", RunContext()).value(), 3u);
     EXPECT_TRUE(fs::exists(folder / "at_03.png"));
     EXPECT_FALSE(fs::exists(folder / "at_04.png"));

@@ -1,5 +1,5 @@
 #include "filigree/present/patch_colors.h"
-#include "filigree/render/color_map.h"
+#include "filigree/render.h"
 
 #include "filigree/mesh/shapes.h"
 #include "filigree/present/patch_drawing.h"

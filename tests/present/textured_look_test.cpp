@@ -5,7 +5,7 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/topology.h"
-#include "filigree/render/picture.h"
+#include "filigree/render.h"
 #include "filigree/scene/melting_surface.h"
 #include "filigree/scene/scene_run.h"
 #include "threads.h"

@@ -1,6 +1,6 @@
 #include "filigree/present/warp_gizmo.h"
 
-#include "filigree/render/camera.h"
+#include "filigree/render.h"
 
 #include <array>
 #include <gtest/gtest.h>

@@ -1,16 +1,15 @@
 // What has to come out the same two ways, on random meshes: threads, order, place, precision, file and memory.
 // rapidcheck prints the seed of a failure; scripts/properties tries many more.
 #include "filigree/coding/mesh_code.h"
-#include "filigree/fracture/fracture.h"
+#include "filigree/fracture.h"
 #include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/strip.h"
 #include "filigree/io/file.h"
 #include "filigree/io/model_file.h"
-#include "filigree/io/shared_strip.h"
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/physics/simulation.h"
-#include "filigree/sample/sample_inside.h"
+#include "filigree/sample.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>
@@ -97,26 +96,6 @@ RC_GTEST_PROP(Differential, StripIsTheSameForAnyNumberOfThreads, ()) {
     const auto a = strip(mesh, options, kOneThread), b = strip(mesh, options, kTwoThreads);
     RC_ASSERT(a.ok() == b.ok());
     if (a) RC_ASSERT(write_model(a->model) == write_model(b->model));
-}
-
-RC_GTEST_PROP(Differential, AStripInTasksIsTheStripInOne, ()) {
-    const Mesh mesh = any_surface();
-    const StripOptions options{.base = *gen::inRange<std::size_t>(8, 200),
-                               .one_piece = *gen::element<std::size_t>(100, 1'000'000)};
-    const std::filesystem::path folder =
-        std::filesystem::temp_directory_path() / ("filigree-tasks-" + std::to_string(::getpid()));
-    std::filesystem::remove_all(folder);
-    std::filesystem::create_directory(folder);
-    const SharedStrip shared{.path = folder / "model.fil",
-                             .options = options,
-                             .read = [&]() -> Result<Mesh> { return mesh; },
-                             .bound_together = *gen::inRange<std::size_t>(50, 3'000)};
-    const auto tasks = strip_in_chunks(shared, {.number = 2, .count = 3, .job = ""}, kTwoThreads);
-    const auto one = strip(mesh, options, kOneThread);
-    const auto bytes = read_file(shared.path);
-    std::filesystem::remove_all(folder);
-    RC_ASSERT(tasks.ok() == one.ok());
-    if (one) RC_ASSERT(bytes.ok() && *bytes == write_model(one->model));
 }
 
 RC_GTEST_PROP(Differential, AnAffinePoseGivesTheMeshMovedAlike, ()) {

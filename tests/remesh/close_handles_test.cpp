@@ -1,5 +1,5 @@
 #include "filigree/io/mesh_file.h"
-#include "filigree/mesh/half_edges.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/remesh/manifold_surface.h"
 #include "remesh/manifold_check.h"

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/io/mesh_file.h"
-#include "filigree/mesh/half_edges.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/remesh/feature_curves.h"
 #include "filigree/remesh/patch_grid.h"
@@ -243,7 +243,7 @@ inline void expect_continuous(const SurfaceMap& map, const Prepared& on, Index e
             for (const double t : {0.07, 0.3, 0.5, 0.81}) {
                 TrianglePoint here{s, Vec3d::Zero()};
                 here.barycentric[k] = 1 - t;
-                here.barycentric[SurfaceMap::next(h) % 3] = t;
+                here.barycentric[next_half_edge(h) % 3] = t;
                 const TrianglePoint traced = map.trace(here);
                 ASSERT_LT(traced.triangle, on.surface.triangles.size());
                 ASSERT_GE(traced.barycentric.minCoeff(), 0);
@@ -255,7 +255,7 @@ inline void expect_continuous(const SurfaceMap& map, const Prepared& on, Index e
                 const Index g = map.twin(h);
                 TrianglePoint there{g / 3, Vec3d::Zero()};
                 there.barycentric[g % 3] = t;
-                there.barycentric[SurfaceMap::next(g) % 3] = 1 - t;
+                there.barycentric[next_half_edge(g) % 3] = 1 - t;
                 ASSERT_LT((map.original_position(map.trace(there)) - place).norm(), tolerance)
                     << "jump over half-edge " << h;
             }

@@ -3,6 +3,7 @@
 
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/topology.h"
+#include "filigree/reference/reference_model.h"
 #include "grids.h"
 #include "hierarchy/stripping.h"
 #include "manifold_check.h"
@@ -517,17 +518,17 @@ TEST(QuadRemesh, SameBytesForAnyNumberOfThreads) {
 TEST(QuadRemesh, StripsToItsBaseAndComesBack) {
     for (const Mesh& mesh : {bumpy_torus(), machined_part(), ridged_sheet()}) {
         const QuadRemeshed quads = remeshed(mesh, {.quads = 6000, .levels = 3});
-        const Stripped result = stripped(quads.mesh, {.code = DetailCode::reference});
-        EXPECT_GE(result.model.levels.size(), 3u);
+        const ReferenceModel model = strip_to_reference(quads.mesh, {}, kOneThread).value();
+        EXPECT_GE(model.levels.size(), 3u);
         // levels are subsets, to the bit; the records on them are floats
-        std::vector<Vec3f> driver = driver_positions(result.model);
+        std::vector<Vec3f> driver = driver_positions(model);
         for (const Vec3f& p : driver)
             EXPECT_TRUE(std::ranges::find(quads.mesh.positions, p) != quads.mesh.positions.end());
-        if (result.model.levels.size() == 3) {
+        if (model.levels.size() == 3) {
             EXPECT_TRUE(same_bytes(driver, base_mesh(quads).positions));
         }
-        EXPECT_LT(filigree_test::distance(restored(result.model, rest_pose(result.model)), quads.mesh.positions).max,
-                  1e-6);
+        const Mesh back = restore_reference(model, driver, {}, kOneThread).value();
+        EXPECT_LT(filigree_test::distance(back.positions, quads.mesh.positions).max, 1e-6);
     }
 }
 

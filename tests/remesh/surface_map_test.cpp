@@ -66,7 +66,7 @@ public:
     void flip() {
         const Index h = any_half_edge();
         if (map_.is_feature(h)) return;
-        const Index g = map_.twin(h), c = map_.from(SurfaceMap::previous(h)), d = map_.from(SurfaceMap::previous(g));
+        const Index g = map_.twin(h), c = map_.from(previous_half_edge(h)), d = map_.from(previous_half_edge(g));
         if (c == d || map_.are_neighbours(c, d)) return;
         for (const Index half : {h, g})
             if (map_.kind(map_.from(half)) == VertexKind::inside ? map_.valence(map_.from(half)) <= 3
@@ -123,8 +123,8 @@ private:
             const std::size_t j = star_.next(i);
             if (i == target || j == target) {
                 const Index w = star_.ring[i == target ? j : i];
-                for (const Index h : {star_.half_edges[i], SurfaceMap::next(star_.half_edges[i]),
-                                      SurfaceMap::previous(star_.half_edges[i])})
+                for (const Index h : {star_.half_edges[i], next_half_edge(star_.half_edges[i]),
+                                      previous_half_edge(star_.half_edges[i])})
                     if (map_.from(h) == w && map_.kind(w) != VertexKind::inside && map_.sector_size(h) <= 2)
                         return false;
                 if (map_.kind(w) == VertexKind::inside && map_.valence(w) <= 3) return false;

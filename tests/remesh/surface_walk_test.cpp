@@ -92,7 +92,7 @@ TEST(SurfaceWalk, SlidesAlongCurvesAndStopsAtCorners) {
     for (Index h = 0; h < on.twins.size(); ++h) {
         if (!on.features[h]) continue;
         TrianglePoint start{h / 3, Vec3d::Zero()};
-        start.barycentric[h % 3] = start.barycentric[SurfaceMap::next(h) % 3] = 0.5;
+        start.barycentric[h % 3] = start.barycentric[next_half_edge(h) % 3] = 0.5;
         const Vec3d here = walk.position(start);
         for (const Vec3d& step : {Vec3d(0.11, 0, 0), Vec3d(-0.11, 0, 0), Vec3d(0, 0.11, 0), Vec3d(0, -0.11, 0),
                                   Vec3d(9, 9, 0), Vec3d(-9, -9, 0)}) {

@@ -1,4 +1,4 @@
-#include "filigree/render/camera.h"
+#include "filigree/render.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Public calls of the layer look at the meshes they are given.
 #include "broken_meshes.h"
-#include "filigree/render/drawable.h"
+#include "filigree/render.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "filigree/render/color_map.h"
+#include "filigree/render.h"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,7 @@
 // Every mesh of the corpus that can be read can be drawn.
 #include "cases.h"
 #include "filigree/io/mesh_file.h"
-#include "filigree/render/gl_context.h"
-#include "filigree/render/renderer.h"
+#include "filigree/render.h"
 #include "io/corpus.h"
 
 #include <gtest/gtest.h>

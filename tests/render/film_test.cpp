@@ -1,4 +1,4 @@
-#include "filigree/render/film.h"
+#include "filigree/render.h"
 
 #include "filigree/io/file.h"
 

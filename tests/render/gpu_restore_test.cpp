@@ -5,7 +5,7 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/render/gl_context.h"
+#include "filigree/render.h"
 #include "hierarchy/stripping.h"
 #include "io/corpus.h"
 
@@ -131,22 +131,6 @@ TEST_F(GpuRestore, IsTheCpuOnEveryShapePoseAndLevel) {
         }
 }
 
-TEST_F(GpuRestore, IsTheCpuForEveryLawAndForThinShells) {
-    for (const Precision precision : kPrecisions) {
-        const Model model =
-            stripped(with_normals(make_wavy_sphere({.resolution = 24})), {.precision = precision}).model;
-        Pose ghosts = without_gradients(bent_and_twisted(model));
-        ghosts.ghosts =
-            warp_positions(*bend_and_twist(model), restorer_of(model).rest_ghosts(), Vec3d::Zero(), kOneThread);
-        for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume})
-            for (const bool shell : {false, true}) {
-                expect_same(model, bent_and_twisted(model), {.law = law, .thin_shell = shell});
-                expect_same(model, without_gradients(bent_and_twisted(model)), {.law = law, .thin_shell = shell});
-            }
-        expect_same(model, ghosts);
-    }
-}
-
 TEST_F(GpuRestore, IsTheCpuOnTheKoala) {
     const auto path = corpus_folder() / "good/koala_100k.obj";
     if (!std::filesystem::exists(path)) GTEST_SKIP() << "no corpus at " << corpus_folder();
@@ -268,16 +252,13 @@ TEST_F(GpuRestore, WhatDoesNotBelongTogetherIsRefused) {
     pose.gradients.pop_back();
     EXPECT_EQ(refused(pose), ErrorCode::mismatch);
     pose = without_gradients(pose);
-    pose.ghosts.resize(1);
-    EXPECT_EQ(refused(pose), ErrorCode::mismatch);
-    pose.ghosts.clear();
     pose.positions.pop_back();
     EXPECT_EQ(refused(pose), ErrorCode::mismatch);
     EXPECT_TRUE(same_bytes(restorer.read_back()->positions, at_rest)); // the last good pose stays
 
     const auto error = [&](std::span<const Index> vertices, std::span<const Vec3f> normals,
-                           const RestoreOptions& options = {}, const Model* of = nullptr) {
-        const Result<GpuRestorer> made = GpuRestorer::create(of ? *of : model, vertices, normals, options, kOneThread);
+                           const RestoreOptions& options = {}) {
+        const Result<GpuRestorer> made = GpuRestorer::create(model, vertices, normals, options, kOneThread);
         return made.ok() ? Error{ErrorCode::usage, "it was made"} : made.error();
     };
     const Error level = error(all, {}, {.level = 17});
@@ -287,11 +268,6 @@ TEST_F(GpuRestore, WhatDoesNotBelongTogetherIsRefused) {
     EXPECT_EQ(error(beyond, {}).code, ErrorCode::mismatch);
     const Vec3f one_normal[] = {Vec3f(0, 0, 1)};
     EXPECT_EQ(error(all, one_normal).code, ErrorCode::mismatch);
-
-    const Model reference = stripped(make_wavy_cube({.resolution = 16}), {.code = DetailCode::reference}).model;
-    const Error code = error(all_vertices(reference), {}, {}, &reference);
-    EXPECT_EQ(code.code, ErrorCode::unsuitable);
-    EXPECT_NE(code.message.find("restore it on the CPU"), std::string::npos) << code.message;
 }
 
 TEST_F(GpuRestore, CanBeCancelled) {

@@ -1,4 +1,4 @@
-#include "filigree/render/picture.h"
+#include "filigree/render.h"
 
 #include <gtest/gtest.h>
 

@@ -23,10 +23,10 @@ Fit fit(const Box& box, std::span<const Vec3f> points) {
             (exact.min - box.min).cwiseMax(box.max - exact.max).maxCoeff() / exact.diagonal()};
 }
 
-Fit fit_at(const Model& model, const Pose& pose, const RestoreOptions& options = {}) {
+Fit fit_at(const Model& model, const Pose& pose) {
     const PoseBox box(model, all_vertices(model));
-    const Restorer restorer = restorer_of(model, options);
-    return fit(box.at(pose.positions, restorer.gradients(pose, kOneThread).value()), restored(model, pose, options));
+    const Restorer restorer = restorer_of(model);
+    return fit(box.at(pose.positions, restorer.gradients(pose, kOneThread).value()), restored(model, pose));
 }
 
 Deformation bend_and_twist(double bend_deg, double twist_deg) {
@@ -105,17 +105,6 @@ TEST_P(PoseBoxes, HoldsWhateverTheGradients) {
         }
         EXPECT_LE(fit_at(model, pose).outside, kRounding);
     }
-}
-
-TEST_P(PoseBoxes, HoldsWithEveryLawAndAsAThinShell) {
-    const Model model = model_of(make_wavy_plane({.resolution = 24}));
-    const Pose pose = without_gradients(pose_by(bend_and_twist(80, 30), model));
-    for (const bool thin : {false, true})
-        for (const HeightLaw law : {HeightLaw::keep, HeightLaw::inverse, HeightLaw::proportional, HeightLaw::volume}) {
-            const Fit f = fit_at(model, pose, {.law = law, .thin_shell = thin});
-            EXPECT_LE(f.outside, kRounding) << thin << int(law);
-            EXPECT_LE(f.slack, 0.05) << thin << int(law);
-        }
 }
 
 TEST_P(PoseBoxes, HoldsOnlyTheVerticesAskedFor) {

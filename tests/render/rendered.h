@@ -2,8 +2,7 @@
 #pragma once
 
 #include "filigree/mesh/shapes.h"
-#include "filigree/render/gl_context.h"
-#include "filigree/render/renderer.h"
+#include "filigree/render.h"
 #include "hierarchy/stripping.h"
 
 #include <gtest/gtest.h>

@@ -252,29 +252,6 @@ TEST_F(Rendered, AModelIsRestoredInTheShaderAsOnTheProcessor) {
     }
 }
 
-TEST_F(Rendered, AReferenceModelIsPosedToo) {
-    const Mesh mesh = make_wavy_cube({.resolution = 16, .frequency = 2});
-    const Model model = stripped(mesh, {.code = DetailCode::reference}).model;
-    const Pose pose = pose_by(bend(60), model);
-    Mesh there = mesh;
-    there.positions = restored(model, {pose.positions, {}, {}});
-    // Diagonals of quads stay those of the rest shape, and so do creases.
-    for (const auto& [shading, distance] :
-         {std::pair(Shading::smooth, 1.0), std::pair(Shading::flat, 1.0), std::pair(Shading::automatic, 2.5)}) {
-        const SurfaceOptions options{.shading = shading};
-        Drawable posed = drawable_of(Drawable::model(model, {}, options, kOneThread));
-        const Drawable rest = surface(mesh, options), here = surface(there, options);
-        EXPECT_EQ(draw(scene_of(posed), camera_on(mesh)).rgba, draw(scene_of(rest), camera_on(mesh)).rgba);
-        EXPECT_TRUE(posed.set_pose(pose, kOneThread).ok());
-        EXPECT_LT(picture_distance(draw(scene_of(posed), camera_on(there)), draw(scene_of(here), camera_on(there))),
-                  distance)
-            << int(shading);
-        Pose wrong = pose;
-        wrong.positions.pop_back();
-        EXPECT_EQ(posed.set_pose(wrong, kOneThread).error().code, ErrorCode::mismatch);
-    }
-}
-
 TEST_F(Rendered, ThePlaceOfASceneDoesNotMatter) {
     const Mesh near_mesh = sphere(6);
     Mesh far_mesh = near_mesh;

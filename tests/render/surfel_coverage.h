@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/mesh/surfels.h"
-#include "filigree/render/camera.h"
+#include "filigree/render.h"
 
 #include <algorithm>
 #include <cmath>

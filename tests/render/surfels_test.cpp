@@ -45,7 +45,7 @@ TEST(SurfelCoverage, RestAndBentShapesAreCovered) {
         const Pose pose = warp_pose(*warp, model, kOneThread);
         Mesh bent = mesh;
         bent.positions = restored(model, pose);
-        const std::vector<Mat3f> gradients = vertex_gradients(std::get<BlendDetail>(model.detail), pose.gradients);
+        const std::vector<Mat3f> gradients = vertex_gradients(model.detail, pose.gradients);
         EXPECT_LT(most_open(bent, split_surfels(carried_surfels(of(mesh), bent.positions, gradients)).value()), 1e-3);
     }
 }

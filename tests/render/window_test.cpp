@@ -316,13 +316,11 @@ TEST_F(InWindow, ProcessorAndShaderRestoreTheSame) {
 TEST_F(InWindow, DrawablesArePreparedInAnyThread) {
     const Mesh mesh = wavy_cube();
     const Model model = stripped(mesh, {.base = 150}).model;
-    const Model reference = stripped(make_wavy_cube({.resolution = 16}), {.code = DetailCode::reference}).model;
     std::vector<DrawData> made;
     std::jthread([&] {
         made.push_back(*DrawData::surface(mesh, {}, kOneThread));
         made.push_back(*DrawData::model(model, {}, {}, RestoreOn::gpu, kOneThread));
         made.push_back(*DrawData::model(model, {}, {}, RestoreOn::cpu, kOneThread));
-        made.push_back(*DrawData::model(reference, {}, {}, RestoreOn::cpu, kOneThread));
         EXPECT_EQ(DrawData::model(model, {.level = 99}, {}, RestoreOn::cpu, kOneThread).error().code, ErrorCode::usage);
         EXPECT_EQ(DrawData::surface({}, {}, kOneThread).error().code, ErrorCode::unsuitable);
         const RunContext cancelled(1);
@@ -333,7 +331,6 @@ TEST_F(InWindow, DrawablesArePreparedInAnyThread) {
     here.push_back(surface(mesh));
     here.push_back(drawable_of(Drawable::model(model, {}, {}, kOneThread)));
     here.push_back(surface(mesh));
-    here.push_back(drawable_of(Drawable::model(reference, {}, {}, kOneThread)));
     for (std::size_t i = 0; i < made.size(); ++i) {
         const Drawable there = drawable_of(Drawable::upload(std::move(made[i])));
         EXPECT_EQ(there.triangle_count(), here[i].triangle_count());

@@ -1,7 +1,7 @@
 // Meshes and lattices that the tests of `sample` share.
 #pragma once
 
-#include "filigree/sample/sample_inside.h"
+#include "filigree/sample.h"
 #include "threads.h"
 
 namespace filigree {

@@ -10,7 +10,7 @@
 
 #include "filigree/mesh/shapes.h"
 #include "filigree/mesh/triangulate.h"
-#include "filigree/sample/sample_inside.h"
+#include "filigree/sample.h"
 
 #include <numbers>
 

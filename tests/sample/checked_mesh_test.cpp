@@ -1,8 +1,6 @@
 // Public calls of the layer look at the meshes they are given.
 #include "broken_meshes.h"
-#include "filigree/sample/inside_test.h"
-#include "filigree/sample/spacing_for_count.h"
-#include "filigree/sample/spread_inside.h"
+#include "filigree/sample.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,6 @@
 #include "filigree/sample/closure.h"
 
 #include "filigree/mesh/shapes.h"
-#include "filigree/sample/edge_balance.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>
@@ -60,16 +59,6 @@ TEST(Closure, VerticesAtOnePlaceAreOne) {
     const RunContext cancelled;
     cancelled.cancel();
     EXPECT_EQ(weld_triangles(apart, cancelled).error().code, ErrorCode::cancelled);
-}
-
-TEST(EdgeBalance, CountsEachEdgeOnce) {
-    const std::vector<Triangle> triangles = {{2, 0, 1}, {0, 2, 3}, {0, 2, 1}, {3, 3, 1}};
-    std::vector<std::array<int, 4>> edges;
-    for_each_edge(4, triangles, [&](const EdgeBalance& e) {
-        edges.push_back({int(e.low), int(e.high), int(e.triangles), e.net});
-    });
-    EXPECT_EQ(edges, (std::vector<std::array<int, 4>>{
-                         {0, 1, 2, 0}, {0, 2, 3, 1}, {0, 3, 1, -1}, {1, 2, 2, 0}, {1, 3, 2, 0}, {2, 3, 1, 1}}));
 }
 
 } // namespace

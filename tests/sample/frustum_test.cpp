@@ -1,7 +1,7 @@
 #include "filigree/sample/frustum.h"
 
 #include "filigree/mesh/shapes.h"
-#include "filigree/sample/inside_test.h"
+#include "filigree/sample.h"
 #include "sample/bodies.h"
 
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 // Every mesh of the corpus that can be read, good and bad, gets points or a sentence.
 #include "filigree/io/mesh_file.h"
-#include "filigree/sample/sample_inside.h"
+#include "filigree/sample.h"
 #include "io/corpus.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
-#include "filigree/sample/lattice.h"
+#include "filigree/sample.h"
+#include "filigree/sample/lattice_memory.h"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,8 @@
-#include "filigree/sample/outward.h"
+#include "filigree/sample.h"
+#include "filigree/sample/closure.h"
 
 #include "bodies.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/sample/inside_test.h"
-#include "filigree/sample/spread_inside.h"
 
 #include <gtest/gtest.h>
 

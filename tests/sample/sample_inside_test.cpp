@@ -1,4 +1,4 @@
-#include "filigree/sample/sample_inside.h"
+#include "filigree/sample.h"
 
 #include "filigree/mesh/shapes.h"
 #include "sample/bodies.h"

@@ -1,8 +1,7 @@
-#include "filigree/sample/spread_inside.h"
+#include "filigree/sample.h"
 
 #include "filigree/core/random.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/sample/inside_test.h"
 #include "sample/bodies.h"
 
 #include <gtest/gtest.h>

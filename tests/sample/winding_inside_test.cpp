@@ -1,3 +1,4 @@
+#include "filigree/sample/inside_scan.h"
 #include "filigree/sample/winding_inside.h"
 
 #include "sample/triangle_surfaces.h"

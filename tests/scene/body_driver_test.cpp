@@ -63,13 +63,6 @@ TEST(BodyDriver, ACoarseOneIsToldWithWhatWouldDo) {
     EXPECT_FALSE(coarse_driver(measure_driver(fine, body), fine, body));
 }
 
-TEST(BodyDriver, TheReferenceCodesQuadsAreJudgedToo) {
-    const Mesh mesh = *make_shape("wavy-cube", {.resolution = 32});
-    const Model model = stripped(mesh, {.code = DetailCode::reference, .levels = 3});
-    EXPECT_FALSE(coarse_driver(measure_driver(model, body_of(mesh, 50)), model, body_of(mesh, 50)));
-    EXPECT_TRUE(coarse_driver(measure_driver(model, body_of(mesh, 8000)), model, body_of(mesh, 8000)));
-}
-
 TEST(BodyDriver, NothingIsExpectedOfAffineMotionAndMoreOfCoarserDrivers) {
     const Mesh mesh = *make_shape("bar", {.resolution = 24});
     const Body body = body_of(mesh, 2000, MaterialModel::fem, 0.5);

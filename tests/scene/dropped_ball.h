@@ -3,7 +3,7 @@
 
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/material.h"
 #include "filigree/scene/dropped_body.h"
 
 #include <algorithm>

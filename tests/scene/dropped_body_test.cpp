@@ -1,7 +1,7 @@
 #include "scene/dropped_ball.h"
 #include "threads.h"
 
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/material.h"
 #include "filigree/physics/simulation.h"
 
 #include <algorithm>

@@ -1,5 +1,7 @@
+#include "coloring.h"
 #include "controls.h"
 #include "one_window.h"
+#include "tools/tool.h"
 
 #include <QApplication>
 #include <QDialog>
@@ -154,11 +156,11 @@ TEST_F(ActionsTest, SwitchesAndChoicesOfTheView) {
     trigger("view.wireframe"); // once more: stays
     EXPECT_TRUE(action("view.wireframe").isChecked());
     trigger("view.color_levels");
-    EXPECT_EQ(workbench().view().settings().coloring, Coloring::levels);
-    for (const auto& [name, tool] : {std::pair{"tool.pin", Tool::pin},
-                                     {"tool.turn", Tool::turn},
-                                     {"tool.torch", Tool::torch},
-                                     {"tool.pull", Tool::pull}}) {
+    EXPECT_EQ(workbench().view().settings().coloring, &kLevelColors);
+    for (const auto& [name, tool] : {std::pair{"tool.pin", &kPinTool},
+                                     {"tool.turn", &kTurnTool},
+                                     {"tool.torch", &kTorchTool},
+                                     {"tool.pull", &kPullTool}}) {
         trigger(name);
         EXPECT_EQ(workbench().view().settings().tool, tool) << name;
     }

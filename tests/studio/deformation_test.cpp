@@ -50,7 +50,7 @@ State pulled(State state, const Vec3f& centre, const Vec3f& way, double grip = 0
     HandleDrag drag;
     drag.begin(state.model, state.handle_pose, pull);
     drag.move(way);
-    state.handle_pose = drag.finish();
+    state.handle_pose = drag.finish().value();
     EXPECT_FALSE(drag.is_active());
     state.handles.push_back(pull);
     return state;
@@ -134,7 +134,7 @@ TEST(HandleDrag, TellsSolutionsWhileItIsDragged) {
     EXPECT_TRUE(QTest::qWaitFor([&] { return latest->positions[grabbed].y() > start + 0.49f; }));
     drag.stop();
     EXPECT_FALSE(drag.is_active());
-    EXPECT_EQ(drag.finish(), nullptr);
+    EXPECT_EQ(drag.finish().value(), nullptr);
 }
 
 TEST(HandleDrag, GoingAwayInTheMiddleIsSafe) {
@@ -175,7 +175,7 @@ TEST(HandleDrag, TellsWhatWasAppliedSoThatItCanBeRepeated) {
     drag.move(Vec3f(0, 0.3f, 0.1f));
     EXPECT_TRUE(drag.is_busy());
     EXPECT_TRUE(QTest::qWaitFor([&] { return !drag.is_busy(); }));
-    const auto pose = drag.finish();
+    const auto pose = drag.finish().value();
     ASSERT_NE(pose, nullptr);
     const std::vector<Vec3f> rest = driver_positions(*state.model);
     for (const Index v : pull.vertices) EXPECT_LT((pose->positions[v] - rest[v] - drag.applied()).norm(), 1e-5f);

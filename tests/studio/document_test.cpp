@@ -106,8 +106,6 @@ TEST(Document, StatesThatDifferInOneSettingAreNotTheSame) {
     };
     differs([](State& s) { s.warps.taper = 0.5; });
     differs([](State& s) { s.restore.level = 3; });
-    differs([](State& s) { s.restore.law = HeightLaw::keep; });
-    differs([](State& s) { s.restore.thin_shell = true; });
     differs([](State& s) { s.strip.base = 100; });
     differs([](State& s) { s.body.material.viscosity = 3; });
     differs([](State& s) { s.body.obstacle = ObstacleChoice::slope; });
@@ -122,10 +120,10 @@ TEST(Document, StatesThatDifferInOneSettingAreNotTheSame) {
 }
 
 TEST(Recording, FollowsWithoutCopyingWhatItHas) {
-    PoseSequence poses{24, {{.positions = {Vec3f(1, 2, 3)}, .gradients = {}, .ghosts = {}}}};
+    PoseSequence poses{24, {{.positions = {Vec3f(1, 2, 3)}, .gradients = {}}}};
     Recording first;
     first.follow(poses);
-    poses.frames.push_back({.positions = {Vec3f(4, 5, 6)}, .gradients = {}, .ghosts = {}});
+    poses.frames.push_back({.positions = {Vec3f(4, 5, 6)}, .gradients = {}});
     Recording longer = first;
     longer.follow(poses);
     ASSERT_EQ(longer.frames.size(), 2u);

@@ -170,13 +170,13 @@ TEST_F(DrawnObjectsTest, ARecordedMomentHasNoFullDeformationOfAnother) {
 }
 
 TEST_F(DrawnObjectsTest, ColorsAreOfWhatTheLegendSays) {
-    set([](ViewSettings& s) { s.coloring = Coloring::levels; });
+    set([](ViewSettings& s) { s.coloring = &kLevelColors; });
     settle();
     const std::size_t count = workbench.state().model->mesh.vertex_count();
     EXPECT_EQ(drawn->colors().values, vertex_levels(*workbench.state().model, workbench.state().model->finest_level()));
     bend(40);
     EXPECT_EQ(drawn->colors().values.size(), count);
-    set([](ViewSettings& s) { s.coloring = Coloring::error; });
+    set([](ViewSettings& s) { s.coloring = &kErrorColors; });
     EXPECT_TRUE(drawn->colors().values.empty()) << "levels under the legend of an error";
     const unsigned level = workbench.state().level();
     const Scene grey = drawn->scene(TileShows::restored, level, {}, 1, QPalette());
@@ -197,13 +197,13 @@ TEST_F(DrawnObjectsTest, ColorsAreOfWhatTheLegendSays) {
     workbench.go_to_frame(1);
     settle();
     EXPECT_TRUE(drawn->colors().values.empty()) << "nobody knows the error of a recorded moment";
-    set([](ViewSettings& s) { s.coloring = Coloring::own; });
+    set([](ViewSettings& s) { s.coloring = &kOwnColors; });
     EXPECT_TRUE(drawn->colors().values.empty());
 }
 
 /// Without knowing the full deformation: that would take every vertex through the same pulls.
 TEST_F(DrawnObjectsTest, TheExpectedErrorIsColouredForEveryPose) {
-    set([](ViewSettings& s) { s.coloring = Coloring::expected_error; });
+    set([](ViewSettings& s) { s.coloring = &kExpectedErrorColors; });
     const std::size_t count = workbench.state().model->mesh.vertex_count();
     const auto most = [&] { return *std::ranges::max_element(drawn->colors().values); };
     settle();
@@ -228,12 +228,7 @@ TEST_F(DrawnObjectsTest, TheExpectedErrorIsColouredForEveryPose) {
     ASSERT_EQ(drawn->colors().values.size(), count) << "a recorded moment has one as well";
     EXPECT_LT(most(), bent) << "it has only begun to fall";
 
-    workbench.set_mode(Mode::deform);
-    workbench.set_strip({.code = DetailCode::reference});
-    settle();
-    ASSERT_EQ(workbench.state().model->code(), DetailCode::reference);
-    EXPECT_TRUE(drawn->colors().values.empty());
-    set([](ViewSettings& s) { s.coloring = Coloring::own; });
+    set([](ViewSettings& s) { s.coloring = &kOwnColors; });
     EXPECT_TRUE(drawn->colors().values.empty());
 }
 
@@ -261,13 +256,13 @@ TEST_F(DrawnObjectsTest, TheMeltIsCutIntoTrianglesOnceForAllPicks) {
 
 /// OpenGL goes away while the melt's heat is shown, and comes back when there is neither.
 TEST_F(DrawnObjectsTest, NoHeatIsLeftOfAMeltThatIsGone) {
-    set([](ViewSettings& s) { s.coloring = Coloring::heat; });
+    set([](ViewSettings& s) { s.coloring = &kHeatColors; });
     melt_some();
     ASSERT_TRUE(drawn->melt());
     EXPECT_FALSE(drawn->colors().values.empty());
     drawn->stop();
     workbench.set_mode(Mode::deform);
-    set([](ViewSettings& s) { s.coloring = Coloring::own; });
+    set([](ViewSettings& s) { s.coloring = &kOwnColors; });
     drawn->start(RestoreOn::cpu);
     settle();
     EXPECT_FALSE(drawn->melt());

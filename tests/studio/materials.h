@@ -1,7 +1,7 @@
 // Materials by name, for tests.
 #pragma once
 
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/material.h"
 
 #include <algorithm>
 #include <string_view>

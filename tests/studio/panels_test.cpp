@@ -1,3 +1,4 @@
+#include "coloring.h"
 #include "one_window.h"
 #include "panel.h"
 
@@ -145,18 +146,8 @@ TEST_F(Panels, ShapesFollowTheirSliders) {
 TEST_F(Panels, ChoicesAndSwitchesReachTheWorkbench) {
     choose("deform.axis", 2);
     EXPECT_EQ(state().warps.axis, Axis::z);
-    choose("detail.law", 2);
-    EXPECT_EQ(state().restore.law, std::optional(HeightLaw::inverse));
-    choose("detail.law", 0);
-    EXPECT_FALSE(state().restore.law);
-    get<QCheckBox>("detail.thin_shell").click();
-    EXPECT_TRUE(state().restore.thin_shell);
     choose("detail.precision", 1);
     EXPECT_EQ(state().strip.precision, Precision::int16);
-    choose("detail.code", 1);
-    EXPECT_EQ(state().model->code(), DetailCode::reference);
-    choose("detail.references", 1);
-    EXPECT_EQ(state().strip.references, 4u);
     choose("body.preset", 2);
     EXPECT_EQ(state().body.preset, "jelly");
     choose("body.obstacle", 2);
@@ -191,9 +182,9 @@ TEST_F(Panels, ChoicesAndSwitchesReachTheWorkbench) {
     choose("view.style", 2);
     EXPECT_EQ(workbench().view().settings().style, SurfaceStyle::wireframe);
     choose("view.coloring", 2);
-    EXPECT_EQ(workbench().view().settings().coloring, Coloring::levels);
+    EXPECT_EQ(workbench().view().settings().coloring, &kLevelColors);
     choose("view.coloring", 4);
-    EXPECT_EQ(workbench().view().settings().coloring, Coloring::expected_error);
+    EXPECT_EQ(workbench().view().settings().coloring, &kExpectedErrorColors);
     EXPECT_TRUE(get<QLabel>("view.error").isVisibleTo(get<QScrollArea>("view").widget()));
     choose("view.up", 2);
     EXPECT_EQ(workbench().view().settings().up, UpAxis::z);
@@ -330,7 +321,7 @@ TEST_F(Panels, NothingIsCutOff) {
     get<QToolButton>("body.advanced").setChecked(true);
     ViewSettings settings;
     settings.clip = settings.inside_points = true;
-    settings.coloring = Coloring::error;
+    settings.coloring = &kErrorColors;
     workbench().view().set(settings);
     choose("body.preset", 8); // wax: all of its rows
     for (const char* panel : {"model", "quads", "detail", "deform", "body", "fracture", "view"}) {

@@ -2,7 +2,7 @@
 
 #include "studio/materials.h"
 
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/material.h"
 
 #include <QSignalSpy>
 #include <QTest>

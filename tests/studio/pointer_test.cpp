@@ -1,4 +1,5 @@
 // What the mouse does in the picture.
+#include "coloring.h"
 #include "viewport_stand.h"
 
 #include "overlay.h"
@@ -176,7 +177,7 @@ TEST(Pointer, TheTorchMeltsABodyUnderTheMouse) {
     Workbench& workbench = stand.workbench;
     QStringList told;
     QObject::connect(&workbench, &Workbench::told, [&](const QString& sentence) { told << sentence; });
-    stand.set([](ViewSettings& s) { s.tool = Tool::torch; });
+    stand.set([](ViewSettings& s) { s.tool = &kTorchTool; });
     stand.drag(stand.middle(), stand.middle() + QPoint(8, 0));
     ASSERT_EQ(told.size(), 1) << "there is no body yet";
     EXPECT_TRUE(told[0].contains("torch"));
@@ -190,7 +191,7 @@ TEST(Pointer, TheTorchMeltsABodyUnderTheMouse) {
     workbench.make_body();
     workbench.wait_until_idle();
     ASSERT_TRUE(stand.is_ready());
-    stand.set([](ViewSettings& s) { s.coloring = Coloring::heat; });
+    stand.set([](ViewSettings& s) { s.coloring = &kHeatColors; });
     QTest::mousePress(stand.viewport, Qt::LeftButton, {}, stand.middle());
     EXPECT_TRUE(QTest::qWaitFor([&] { return workbench.melt_surface() != nullptr; }, 60'000));
     QTest::mouseRelease(stand.viewport, Qt::LeftButton, {}, stand.middle());
@@ -223,7 +224,7 @@ TEST(Pointer, TheTorchMeltsABodyUnderTheMouse) {
 TEST(Pointer, ThePinToolPinsAndUnpins) {
     Stand stand;
     ASSERT_TRUE(stand.is_ready());
-    stand.set([](ViewSettings& s) { s.tool = Tool::pin; });
+    stand.set([](ViewSettings& s) { s.tool = &kPinTool; });
     const auto pinned = [&] {
         std::size_t count = 0;
         for (const Handle& handle : stand.workbench.state().handles)
@@ -242,6 +243,24 @@ TEST(Pointer, ThePinToolPinsAndUnpins) {
     EXPECT_EQ(static_cast<const Overlay*>(overlay)->content().pins.size(), some);
     stand.drag(stand.middle(), stand.middle() + QPoint(30, 0), Qt::LeftButton, Qt::ControlModifier);
     EXPECT_EQ(pinned(), 0u);
+}
+
+TEST(Pointer, ADragKeepsTheToolItBeganWith) {
+    Stand stand;
+    ASSERT_TRUE(stand.is_ready());
+    const QPoint from = stand.middle(), to = from + QPoint(30, 0);
+    stand.press(from);
+    stand.move(from, to);
+    stand.set([](ViewSettings& s) { s.tool = &kPinTool; });
+    EXPECT_TRUE(stand.workbench.is_pulling());
+    stand.release(to);
+    stand.workbench.wait_until_idle();
+    ASSERT_EQ(stand.workbench.state().handles.size(), 1u);
+    EXPECT_FALSE(stand.workbench.state().handles[0].pinned);
+    ASSERT_TRUE(stand.is_ready());
+    stand.drag(from, to);
+    ASSERT_EQ(stand.workbench.state().handles.size(), 2u);
+    EXPECT_TRUE(stand.workbench.state().handles[1].pinned);
 }
 
 TEST(Pointer, ADragPullsABody) {
@@ -346,13 +365,13 @@ TEST(Pointer, ADragEndsWithTheModelThatItIsOf) {
         stand.workbench.set_strip(options);
         stand.workbench.wait_until_idle();
     };
-    for (const Tool tool : {Tool::pin, Tool::pull}) {
+    for (const ToolEntry* const tool : {&kPinTool, &kPullTool}) {
         stand.set([&](ViewSettings& s) { s.tool = tool; });
         ASSERT_TRUE(stand.is_ready());
         const QPoint from = stand.middle(), to = from + QPoint(30, 0);
         stand.press(from);
-        if (tool == Tool::pin) stand.move(from, to);
-        strip_again(tool == Tool::pin ? 20 : 30);
+        if (tool == &kPinTool) stand.move(from, to);
+        strip_again(tool == &kPinTool ? 20 : 30);
         const State before = stand.workbench.document().state();
         stand.move(from, to);
         stand.release(to);

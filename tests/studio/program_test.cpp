@@ -1,5 +1,5 @@
 // The program as a user starts it: options, scripts, screenshots, exit codes.
-#include "filigree/render/picture.h"
+#include "filigree/render.h"
 
 #include <QProcess>
 #include <QTemporaryDir>

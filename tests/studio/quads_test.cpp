@@ -24,7 +24,7 @@ using namespace filigree::studio;
 
 namespace {
 
-/// A window with a closed surface of triangles: no reference code takes it as it is.
+/// A window with a closed surface of triangles.
 class Quads : public OneWindow {
 protected:
     void SetUp() override {
@@ -83,21 +83,6 @@ TEST_F(Quads, TheMeshBecomesQuadsInOneStep) {
     EXPECT_EQ(state().model, before.model);
     undo_stack().redo();
     EXPECT_TRUE(state().source->quads);
-}
-
-TEST_F(Quads, TheReferenceCodeWorksOnThem) {
-    workbench().set_strip({.code = DetailCode::reference});
-    workbench().wait_until_idle();
-    ASSERT_EQ(state().model->code(), DetailCode::blend) << "the mesh before is not regular";
-    make_quads();
-    ASSERT_TRUE(state().source->quads);
-    get<QComboBox>("detail.code").setCurrentIndex(1);
-    workbench().wait_until_idle();
-    EXPECT_EQ(state().model->code(), DetailCode::reference);
-    EXPECT_GE(state().model->finest_level(), state().source->quads->report.levels);
-    const std::size_t finest = level_mesh(*state().model, state().level()).face_count();
-    workbench().remove_detail();
-    EXPECT_EQ(4 * level_mesh(*state().model, state().level()).face_count(), finest);
 }
 
 TEST_F(Quads, OtherQuadsAreMadeOfTheMeshBefore) {

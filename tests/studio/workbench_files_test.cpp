@@ -7,7 +7,7 @@
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
 #include "filigree/mesh/shapes.h"
-#include "filigree/render/gl_context.h"
+#include "filigree/render.h"
 
 #include <QSignalSpy>
 #include <QTest>
@@ -269,24 +269,23 @@ TEST_F(WorkbenchTest, OpeningIsNeitherDroppedNorDoesItDropChanges) {
 TEST_F(WorkbenchTest, ADocumentIsSavedOnlyWhenTheFileHoldsItAll) {
     make_small_shape();
     QSignalSpy saved(&bench, &Workbench::saved);
-    bench.set_law(HeightLaw::keep);
     bench.save_model(path("a.fil"));
     bench.wait_until_idle();
     EXPECT_EQ(saved.count(), 1);
-    EXPECT_FALSE(bench.document().is_modified()); // a law is how it is shown
-    EXPECT_EQ(notes.back(), "Saved a.fil, without the law.");
+    EXPECT_FALSE(bench.document().is_modified());
+    EXPECT_EQ(notes.back(), "Saved a.fil.");
     bench.pin(std::vector<Index>{0, 1});
     bench.save_model(path("a.fil"));
     bench.wait_until_idle();
     EXPECT_TRUE(bench.document().is_modified());
-    EXPECT_EQ(notes.back(), "Saved a.fil, without the pins and the law.");
+    EXPECT_EQ(notes.back(), "Saved a.fil, without the pins.");
     bench.unpin_all();
     bend(30);
     simulate(2);
     bench.save_model(path("a.fil"));
     bench.wait_until_idle();
     EXPECT_TRUE(bench.document().is_modified());
-    EXPECT_EQ(notes.back(), "Saved a.fil with its recording, without the deformation and the law.");
+    EXPECT_EQ(notes.back(), "Saved a.fil with its recording, without the deformation.");
 }
 
 TEST_F(WorkbenchTest, AnOpenedModelKnowsHowItWasStripped) {

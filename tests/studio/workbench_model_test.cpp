@@ -69,16 +69,6 @@ TEST_F(WorkbenchTest, LevelsGoOneByOne) {
     EXPECT_EQ(state().level(), finest);
 }
 
-TEST_F(WorkbenchTest, LawAndThinShellAreSteps) {
-    bench.set_law(HeightLaw::volume);
-    bench.set_thin_shell(true);
-    EXPECT_EQ(state().restore.law, HeightLaw::volume);
-    EXPECT_TRUE(state().restore.thin_shell);
-    EXPECT_EQ(undo_stack().count(), 2);
-    bench.set_law(HeightLaw::volume);
-    EXPECT_EQ(undo_stack().count(), 2);
-}
-
 TEST_F(WorkbenchTest, StrippingAgainKeepsWarpsAndDropsWhatBelongsToTheDriver) {
     Warps warps;
     warps.twist = 30;
@@ -97,27 +87,6 @@ TEST_F(WorkbenchTest, StrippingAgainKeepsWarpsAndDropsWhatBelongsToTheDriver) {
     undo_stack().undo();
     EXPECT_TRUE(state() == before);
     EXPECT_TRUE(errors.empty());
-}
-
-TEST_F(WorkbenchTest, TheReferenceCodeWorksOnRegularQuads) {
-    bench.set_strip({.code = DetailCode::reference});
-    bench.wait_until_idle();
-    EXPECT_EQ(state().model->code(), DetailCode::reference);
-    bend(45);
-    bench.save_mesh(path("bent.obj"));
-    bench.wait_until_idle();
-    EXPECT_TRUE(errors.empty());
-}
-
-TEST_F(WorkbenchTest, WhatTheReferenceCodeRefusesIsToldAndChangesNothing) {
-    ASSERT_TRUE(write_mesh(level_mesh(*state().model, 0), path("triangles.obj"), {}, RunContext()).ok());
-    bench.open(path("triangles.obj"));
-    bench.wait_until_idle();
-    const State before = state();
-    bench.set_strip({.code = DetailCode::reference});
-    bench.wait_until_idle();
-    ASSERT_EQ(errors.size(), 1u);
-    EXPECT_TRUE(state() == before);
 }
 
 TEST_F(WorkbenchTest, PointsInsideAreSampled) {

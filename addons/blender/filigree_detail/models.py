@@ -62,8 +62,8 @@ def restorer_of(settings, level=None):
     model = model_of(settings)
     if model is None:
         return None
-    key = (settings.model[_KEY], settings.law, settings.thin_shell, level)
+    key = (settings.model[_KEY], level)
     if key not in _restorers:
-        restorer = filigree.Restorer(model, law=settings.law, thin_shell=settings.thin_shell, level=level)
+        restorer = filigree.Restorer(model, level=level)
         _restorers[key] = (restorer, np.empty((len(restorer), 3), np.float32))
     return _restorers[key]

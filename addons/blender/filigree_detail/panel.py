@@ -74,8 +74,6 @@ class FILIGREE_PT_detail(_Panel, bpy.types.Panel):
             return
         layout.prop(settings, "enabled")
         layout.prop(settings, "object_motion")
-        layout.prop(settings, "law")
-        layout.prop(settings, "thin_shell")
         layout.prop(settings, "viewport_level")
         for sentence in _warnings(context, high):
             box = layout.box()

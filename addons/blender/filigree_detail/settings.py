@@ -2,14 +2,6 @@
 
 import bpy
 
-LAWS = (
-    ("proportional", "Proportional", "Bumps grow with the surface around them"),
-    ("keep", "Keep", "Bumps keep their height"),
-    ("inverse", "Inverse", "Bumps shrink where the surface grows"),
-    ("volume", "Volume", "Bumps keep their volume"),
-)
-
-
 def _changed(settings, context):
     from . import follow
 
@@ -33,11 +25,6 @@ class FiligreeSettings(bpy.types.PropertyGroup):
     object_motion: bpy.props.BoolProperty(
         name="Object Motion", default=True, update=_changed,
         description="Follow the driver's place, rotation and scale as well, not only its vertices")
-    law: bpy.props.EnumProperty(
-        name="Heights", items=LAWS, update=_changed,
-        description="What becomes of the height of bumps where the surface around them grows")
-    thin_shell: bpy.props.BoolProperty(
-        name="Thin Shell", update=_changed, description="Bumps keep their shape, as on cloth and skin, and do not shear with the body")
     viewport_level: bpy.props.IntProperty(
         name="Level", default=-1, min=-1, max=16, update=_level_changed,
         description="Level shown in the viewport, 0 the coarsest; -1 the finest. Renders have the finest")

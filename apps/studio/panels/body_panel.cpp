@@ -4,7 +4,7 @@
 #include "panel.h"
 #include "pieces.h"
 
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/material.h"
 #include "filigree/scene/scene_keys.h"
 
 #include <algorithm>

@@ -2,32 +2,14 @@
 
 #include "panel.h"
 
-#include <array>
-
 namespace filigree::studio {
 namespace {
 
-constexpr std::array<unsigned, 3> kReferences = {3, 4, 6};
 constexpr std::size_t kLeastDriver = 3; // vertices: a face
 
-const Field<StripOptions> kCode = {
-    [](const StripOptions& options) { return double(options.code == DetailCode::reference); },
-    [](StripOptions& options, double reference) {
-        options = {};
-        options.code = reference ? DetailCode::reference : DetailCode::blend;
-    }};
-const Field<StripOptions> kReferenceChoice = {
-    [](const StripOptions& options) {
-        const auto found = std::ranges::find(kReferences, options.references);
-        return found == kReferences.end() ? 0.0 : double(found - kReferences.begin());
-    },
-    [](StripOptions& options, double index) { options.references = kReferences[std::size_t(index)]; }};
 const Field<StripOptions> kHalfSize = {
     [](const StripOptions& options) { return double(options.precision == Precision::int16); },
     [](StripOptions& options, double half) { options.precision = half ? Precision::int16 : Precision::float32; }};
-
-bool is_blend(const StripOptions& options) { return options.code == DetailCode::blend; }
-bool is_reference(const StripOptions& options) { return !is_blend(options); }
 
 class DetailPanel : public Panel {
 public:
@@ -45,7 +27,6 @@ public:
         levels_ = text(rows, "detail.levels");
         levels_->setTextFormat(Qt::RichText);
         add_driver();
-        add_law();
         report_ = text(section("Report"), "detail.report", Tone::quiet);
         refresh();
     }
@@ -64,49 +45,11 @@ private:
                                               of.error.reset();
                                               of.base = std::size_t(count);
                                           }};
-        driver_ =
-            number(rows,
-                   options.setting("detail.driver", "Size", "About so many vertices move; all others follow", size, {},
-                                   is_blend),
-                   {.least = kLeastDriver, .most = 20000, .decimals = 0, .unit = "vertices", .logarithmic = true});
-        choice(rows,
-               options.setting(
-                   "detail.code", "Code",
-                   "How detail is stored. Blend: three driver vertices and an offset. Reference: the report's, "
-                   "for regular quads.",
-                   kCode),
-               {"Blend (any mesh)", "Reference (the report's)"});
-        choice(rows,
-               options.setting("detail.references", "References",
-                               "How many vertices of the coarser level a vertex is stored by", kReferenceChoice,
-                               is_reference),
-               {"3 vertices", "4 vertices", "6 vertices"});
-        choice(
-            rows,
-            options.setting("detail.precision", "Precision", "Of what is stored for each vertex", kHalfSize, is_blend),
-            {"32 bit (20 bytes a vertex)", "16 bit (10 bytes a vertex)"});
-    }
-
-    void add_law() {
-        QGridLayout* rows = section("Returning detail");
-        choice(
-            rows,
-            {"detail.law", "Height",
-             "How the height of detail follows its surroundings. Automatic: proportional for the blend code, inverse "
-             "for the reference code. Keep: as at rest. Inverse: lower where stretched. Proportional: as the "
-             "surroundings grow. Volume: what is between stays as much.",
-             [this] { return state().restore.law ? 1.0 + int(*state().restore.law) : 0.0; },
-             [this](double index) {
-                 workbench().set_law(index > 0 ? std::optional(HeightLaw(int(index) - 1)) : std::nullopt);
-             }},
-            {"Automatic", "Keep", "Inverse (the report's)", "Proportional", "Volume"});
-        check(rows, {"detail.thin_shell",
-                     "Thin shell",
-                     "Bumps keep their shape (cloth, skin) instead of stretching with the body; blend code",
-                     [this] { return state().restore.thin_shell; },
-                     [this](double thin) { workbench().set_thin_shell(thin != 0); },
-                     {},
-                     [this] { return state().model->code() == DetailCode::blend; }});
+        driver_ = number(
+            rows, options.setting("detail.driver", "Size", "About so many vertices move; all others follow", size),
+            {.least = kLeastDriver, .most = 20000, .decimals = 0, .unit = "vertices", .logarithmic = true});
+        choice(rows, options.setting("detail.precision", "Precision", "Of what is stored for each vertex", kHalfSize),
+               {"32 bit (20 bytes a vertex)", "16 bit (10 bytes a vertex)"});
     }
 
     void refresh() override {

@@ -76,8 +76,8 @@ private:
                             field(&ViewSettings::apart), {}, has_pieces),
                {.least = 0, .most = 1, .step = 0.01, .decimals = 2});
         const Field<ViewSettings> colored = {
-            [](const ViewSettings& settings) { return double(settings.coloring == Coloring::pieces); },
-            [](ViewSettings& settings, double on) { settings.coloring = on ? Coloring::pieces : Coloring::own; }};
+            [](const ViewSettings& settings) { return double(settings.coloring == &kPieceColors); },
+            [](ViewSettings& settings, double on) { settings.coloring = on ? &kPieceColors : &kOwnColors; }};
         check(rows, view.setting("fracture.colored", "Pieces as colours", "Each piece in one of eight colours", colored,
                                  {}, has_pieces));
         none_ = text(rows, "fracture.none", Tone::quiet);

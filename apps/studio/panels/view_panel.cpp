@@ -1,7 +1,10 @@
 #include "panels/panels.h"
 
+#include "coloring.h"
 #include "panel.h"
 #include "window.h"
+
+#include <algorithm>
 
 namespace filigree::studio {
 
@@ -9,10 +12,14 @@ namespace {
 
 using Settings = ViewSettings;
 
+/// The colouring as its place in the table.
+const Field<Settings> kColoring = {
+    [](const Settings& settings) {
+        return double(std::ranges::find(colorings(), settings.coloring) - colorings().begin());
+    },
+    [](Settings& settings, double row) { settings.coloring = colorings()[std::size_t(row)]; }};
+
 QString expected_error_text(const Workbench& workbench) {
-    const State& state = workbench.state();
-    if (state.model && state.model->code() != DetailCode::blend)
-        return QStringLiteral("What the reference code is off by can only be measured.");
     const PoseError::Estimate* estimate = workbench.expected_error().estimate();
     if (!estimate) return QStringLiteral("Not judged yet.");
     return QStringLiteral("Expected from the pose alone: %1 of the diagonal (root mean square).")
@@ -76,16 +83,15 @@ public:
 private:
     void add_surface(MainWindow& window) {
         const auto view = view_settings();
+        QStringList choices, tips;
+        for (const Coloring* const coloring : colorings()) {
+            choices << coloring->choice;
+            tips << QString(coloring->choice) + ": " + coloring->tip;
+        }
         QGridLayout* rows = section("Surface");
         choice(rows, view.setting("view.style", "Style", "How the surface is drawn", field(&Settings::style)),
                {"Shaded", "Shaded with edges", "Wireframe"});
-        choice(rows,
-               view.setting(
-                   "view.coloring", "Colours",
-                   "The mesh's own; how far it is from the full deformation; at which level a vertex is added; "
-                   "patches of regular quads; how far it is expected to be from the full deformation; pieces; heat",
-                   field(&Settings::coloring)),
-               {"Its own", "Error", "Levels", "Patches", "Expected error", "Pieces", "Heat"});
+        choice(rows, view.setting("view.coloring", "Colours", tips.join("\n"), kColoring), choices);
         error_ = text(rows, "view.error", Tone::quiet);
         measure_ = new ActionButton("view.measure", window.actions().find("view.measure_error"), {}, page());
         beside(rows, {measure_});
@@ -102,11 +108,11 @@ private:
     }
 
     void show_error() {
-        const Coloring coloring = workbench().view().settings().coloring;
-        const bool is_measured = coloring == Coloring::error;
+        const Coloring* const coloring = workbench().view().settings().coloring;
+        const bool is_measured = coloring == &kErrorColors;
         const QString text = is_measured ? error_text(workbench(), true) : expected_error_text(workbench());
         error_->setText(text.isEmpty() ? QStringLiteral("Not measured for what is shown.") : text);
-        error_->setVisible(is_measured || coloring == Coloring::expected_error);
+        error_->setVisible(is_measured || coloring == &kExpectedErrorColors);
         measure_->setVisible(is_measured);
     }
 

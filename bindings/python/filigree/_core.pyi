@@ -322,8 +322,6 @@ class Model:
     @property
     def finest_level(self) -> int: ...
     @property
-    def code(self) -> str: ...
-    @property
     def report(self) -> _Report: ...
     def level(self, level: int) -> Mesh: ...
     def tobytes(self) -> bytes: ...
@@ -392,14 +390,11 @@ class Pose:
         self,
         positions: ArrayLike,
         gradients: ArrayLike | None = None,
-        ghosts: ArrayLike | None = None,
     ) -> None: ...
     @property
     def positions(self) -> _Floats: ...
     @property
     def gradients(self) -> _Floats | None: ...
-    @property
-    def ghosts(self) -> _Floats | None: ...
     def __len__(self) -> int: ...
 
 class PoseSequence:
@@ -419,13 +414,31 @@ class PoseSequence:
     @overload
     def __getitem__(self, frames: slice) -> PoseSequence: ...
 
+class ReferenceModel:
+    @property
+    def mesh(self) -> Mesh: ...
+    @property
+    def driver(self) -> Mesh: ...
+    @property
+    def finest_level(self) -> int: ...
+    def level(self, level: int) -> Mesh: ...
+    def restore(
+        self,
+        pose: ArrayLike,
+        *,
+        law: str = 'inverse',
+        level: int | None = None,
+        threads: int = 0,
+    ) -> Mesh: ...
+    def tobytes(self) -> bytes: ...
+    @staticmethod
+    def frombytes(bytes: bytes) -> ReferenceModel: ...
+
 class Restorer:
     def __init__(
         self,
         model: Model,
         *,
-        law: str | None = None,
-        thin_shell: bool = False,
         level: int | None = None,
     ) -> None: ...
     def positions(
@@ -433,7 +446,6 @@ class Restorer:
         pose: _PoseLike,
         gradients: ArrayLike | None = None,
         *,
-        ghosts: ArrayLike | None = None,
         out: _Floats | None = None,
         world: bool = False,
         threads: int = 0,
@@ -443,18 +455,11 @@ class Restorer:
         pose: _PoseLike,
         gradients: ArrayLike | None = None,
         *,
-        ghosts: ArrayLike | None = None,
         threads: int = 0,
     ) -> Mesh: ...
-    def gradients(self, pose: _PoseLike, *, ghosts: ArrayLike | None = None, threads: int = 0) -> _Floats: ...
-    @property
-    def rest_ghosts(self) -> _Floats: ...
+    def gradients(self, pose: _PoseLike, *, threads: int = 0) -> _Floats: ...
     @property
     def model(self) -> Model: ...
-    @property
-    def law(self) -> str | None: ...
-    @property
-    def thin_shell(self) -> bool: ...
     @property
     def level(self) -> int | None: ...
     def __len__(self) -> int: ...
@@ -626,8 +631,6 @@ def export(
     all_levels: bool = False,
     normals: bool = True,
     morph_normals: bool = False,
-    law: str | None = None,
-    thin_shell: bool = False,
     level: int | None = None,
     materials_beside: _Path = '',
     threads: int = 0,
@@ -725,9 +728,6 @@ def restore(
     pose: _PoseLike,
     gradients: ArrayLike | None = None,
     *,
-    ghosts: ArrayLike | None = None,
-    law: str | None = None,
-    thin_shell: bool = False,
     level: int | None = None,
     threads: int = 0,
 ) -> Mesh: ...
@@ -760,13 +760,20 @@ def strip(
     fidelity: float | None = None,
     fidelity_from: str = 'positions',
     max_edge: float | None = None,
-    code: str = 'blend',
     precision: str = 'float',
-    references: int = 3,
     reorder: bool = False,
     threads: int = 0,
     progress: _Progress | None = None,
 ) -> Model: ...
+def strip_reference(
+    mesh: _MeshLike,
+    *,
+    base: int | None = None,
+    levels: int | None = None,
+    references: int = 3,
+    threads: int = 0,
+    progress: _Progress | None = None,
+) -> ReferenceModel: ...
 def taper(box: _BoxLike, axis: str | None, factor: float) -> Warp: ...
 def twist(box: _BoxLike, axis: str | None, degrees: float) -> Warp: ...
 def vertex_distances(a: _MeshLike, b: _MeshLike, *, threads: int = 0) -> _Floats: ...

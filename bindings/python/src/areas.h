@@ -16,6 +16,7 @@ void add_poses(py::module_& m);
 void add_models(py::module_& m);
 void add_files(py::module_& m);
 void add_restoring(py::module_& m);
+void add_reference(py::module_& m);
 void add_warps(py::module_& m);
 void add_handles(py::module_& m);
 void add_comparing(py::module_& m);

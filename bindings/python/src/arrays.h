@@ -4,7 +4,7 @@
 #include "errors.h"
 
 #include <filigree/core/types.h>
-#include <filigree/physics/vectors.h>
+#include <filigree/physics/body.h>
 
 #include <pybind11/numpy.h>
 

@@ -2,7 +2,7 @@
 
 #include "calls.h"
 
-#include <filigree/physics/named_materials.h>
+#include <filigree/physics/material.h>
 #include <filigree/scene/particles_near.h>
 #include <filigree/scene/scene_keys.h>
 

@@ -4,8 +4,8 @@
 #include "arrays.h"
 #include "calls.h"
 
-#include <filigree/physics/grid_limits.h>
-#include <filigree/physics/own_weight.h>
+#include <filigree/physics/grid/grid_limits.h>
+#include <filigree/physics/body/own_weight.h>
 
 #include <numbers>
 

@@ -3,7 +3,7 @@
 #include <filigree/mesh/mesh_distance.h>
 #include <filigree/mesh/topology.h>
 #include <filigree/remesh/quad_quality.h>
-#include <filigree/sample/closure.h>
+#include <filigree/sample.h>
 
 namespace filigree::python {
 
@@ -65,7 +65,7 @@ py::dict quad_info(const QuadQuality& quality) {
 py::dict model_info(const Model& model) {
     py::dict said;
     said["kind"] = "model";
-    said["code"] = model.code() == DetailCode::blend ? "blend" : "reference";
+    said["code"] = "blend";
     py::list levels;
     for (unsigned k = 0; k <= model.finest_level(); ++k) {
         const LevelCounts counts = level_counts(model, k);
@@ -75,15 +75,9 @@ py::dict model_info(const Model& model) {
         levels.append(level);
     }
     said["levels"] = levels;
-    if (const auto* blend = std::get_if<BlendDetail>(&model.detail)) {
-        said["precision"] = blend->precision == Precision::int16 ? "int16" : "float";
-        said["across_gap"] = blend->across_gap.size();
-        said["facing_away"] = blend->facing_away.size();
-    } else {
-        const auto& reference = std::get<ReferenceDetail>(model.detail);
-        said["references"] = reference.references;
-        said["patches"] = reference.patches.patch_count();
-    }
+    said["precision"] = model.detail.precision == Precision::int16 ? "int16" : "float";
+    said["across_gap"] = model.detail.across_gap.size();
+    said["facing_away"] = model.detail.facing_away.size();
     return said;
 }
 

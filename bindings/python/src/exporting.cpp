@@ -59,7 +59,7 @@ py::dict write_moving(const MeshAnimation& animation, const fs::path& path, cons
 
 py::dict export_poses(const Model& model, const PoseSequence& poses, const ExportOptions& options, const fs::path& path,
                       const LongCall& call) {
-    const PoseStream stream = stream_of(poses);
+    const FrameSource<Pose> stream = frames_of(poses);
     const AnimationFormat format = animation_format(path).value();
     if (format == AnimationFormat::glb && options.as_skin) {
         const ExportReport report = call([&](const RunContext& context) {
@@ -74,7 +74,7 @@ py::dict export_poses(const Model& model, const PoseSequence& poses, const Expor
     if (format == AnimationFormat::numbered) {
         const auto mesh = [&](std::size_t frame) { return restorer.mesh(poses.frames[frame], silent); };
         warn(call([&](const RunContext& context) {
-            return write_numbered_meshes(poses.frames.size(), mesh, path, context).value();
+            return write_numbered_meshes({poses.frames.size(), poses.frames_per_second, mesh}, path, context).value();
         }));
         return said_of(poses.frames.size(), poses.frames_per_second, restorer.vertex_count());
     }
@@ -89,9 +89,8 @@ py::dict export_poses(const Model& model, const PoseSequence& poses, const Expor
 py::dict export_model(const PyModel& self, const fs::path& path, const py::object& poses, double frames_per_second,
                       const std::optional<std::string>& as, std::optional<double> key_rate,
                       const std::string& interpolation, unsigned influences, bool full_precision, bool compress,
-                      bool all_levels, bool normals, bool morph_normals, const std::optional<std::string>& law,
-                      bool thin_shell, std::optional<unsigned> level, const fs::path& materials_beside,
-                      unsigned threads, const py::object& progress) {
+                      bool all_levels, bool normals, bool morph_normals, std::optional<unsigned> level,
+                      const fs::path& materials_beside, unsigned threads, const py::object& progress) {
     const Model& model = *self.model;
     const LongCall call{threads, progress};
     if (poses.is_none()) {
@@ -107,9 +106,8 @@ py::dict export_model(const PyModel& self, const fs::path& path, const py::objec
         return said;
     }
     ExportOptions options;
-    options.as_skin =
-        as ? value_of<bool>(*as, "motion", {{"skin", true}, {"morph", false}}) : model.code() == DetailCode::blend;
-    options.skin.restore = restore_options(law, thin_shell, level);
+    options.as_skin = !as || value_of<bool>(*as, "motion", {{"skin", true}, {"morph", false}});
+    options.skin.restore.level = level;
     options.skin.key_rate = key_rate;
     options.skin.interpolation = value_of<KeyInterpolation>(
         interpolation, "interpolation", {{"linear", KeyInterpolation::linear}, {"cubic", KeyInterpolation::cubic}});
@@ -154,10 +152,9 @@ void add_exporting(py::module_& m) {
         py::arg("frames_per_second") = 60.0, py::arg("motion") = py::none(), py::arg("key_rate") = py::none(),
         py::arg("interpolation") = "linear", py::arg("influences") = 3, py::arg("full_precision") = false,
         py::arg("compress") = false, py::arg("all_levels") = false, py::arg("normals") = true,
-        py::arg("morph_normals") = false, py::arg("law") = py::none(), py::arg("thin_shell") = false,
-        py::arg("level") = py::none(), py::arg("materials_beside") = "", py::arg("threads") = 0,
-        py::arg("progress") = py::none(),
-        R"(export(model, path, poses=None, *, frames_per_second=60.0, motion=None, key_rate=None, interpolation='linear', influences=3, full_precision=False, compress=False, all_levels=False, normals=True, morph_normals=False, law=None, thin_shell=False, level=None, materials_beside='', threads=0, progress=None)
+        py::arg("morph_normals") = false, py::arg("level") = py::none(), py::arg("materials_beside") = "",
+        py::arg("threads") = 0, py::arg("progress") = py::none(),
+        R"(export(model, path, poses=None, *, frames_per_second=60.0, motion=None, key_rate=None, interpolation='linear', influences=3, full_precision=False, compress=False, all_levels=False, normals=True, morph_normals=False, level=None, materials_beside='', threads=0, progress=None)
 --
 
 Write a model, moving or at rest, for other programs.
@@ -172,7 +169,7 @@ poses : PoseSequence, array_like (f, d, 3), or sequence of Pose, optional
 frames_per_second : float
     Of poses that are no PoseSequence.
 motion : str, optional
-    GLB: 'skin', one joint a driver vertex, or 'morph', every frame's positions. None: a skin where the code makes one.
+    GLB: 'skin', one joint a driver vertex, or 'morph', every frame's positions. None: a skin.
 key_rate : float, optional
     Skin: keys a second; None: one a frame.
 interpolation : str
@@ -187,8 +184,8 @@ normals : bool
     GLB: False leaves them out, and viewers shade flat.
 morph_normals : bool
     Morph targets: normals of each frame too.
-law, thin_shell, level
-    As of `Restorer`.
+level : int, optional
+    Restore up to this level; None: the finest.
 materials_beside : path
     Where material libraries are looked for: the mesh's own path.
 

@@ -107,12 +107,12 @@ PoseSequence read_pose_file(const fs::path& path, const py::object& model, std::
                                                         : std::nullopt,
                                       .rest = rest,
                                       .warnings = &warnings};
-        const PoseStream stream = open_poses(path, rest.size(), of->mesh.origin, options, context).value();
+        const FrameSource<Pose> stream = open_poses(path, rest.size(), of->mesh.origin, options, context).value();
         PoseSequence poses{stream.frames_per_second, {}};
         for (std::size_t frame = 0; frame < stream.frames; ++frame) {
             if (context.is_cancelled()) throw BadResultAccess(cancelled_error());
             context.report("reading poses", double(frame) / double(stream.frames));
-            poses.frames.push_back(stream.pose(frame).value());
+            poses.frames.push_back(stream.frame(frame).value());
         }
         return poses;
     });

@@ -1,8 +1,7 @@
 #include "calls.h"
 #include "meshes.h"
 
-#include <filigree/fracture/fracture.h>
-#include <filigree/fracture/fracture_pattern.h>
+#include <filigree/fracture.h>
 
 namespace filigree::python {
 

@@ -4,7 +4,7 @@
 #include "arrays.h"
 
 #include <filigree/mesh/mesh.h>
-#include <filigree/sample/outward.h>
+#include <filigree/sample.h>
 
 #include <memory>
 

@@ -51,29 +51,22 @@ PyModel strip_to(const py::object& given, const py::object& driver_given, const 
     return {std::make_shared<const Model>(std::move(stripped.model)), report_of(stripped.report)};
 }
 
-/// The vertices that a list of the blend code names; none for the reference code.
 py::object listed(const py::object& self, const std::vector<Index> BlendDetail::*list) {
-    static const std::vector<Index> none;
-    const auto* detail = std::get_if<BlendDetail>(&self.cast<const PyModel&>().model->detail);
-    return view(detail ? detail->*list : none, self);
+    return view(self.cast<const PyModel&>().model->detail.*list, self);
 }
 
 PyModel strip_mesh(const py::object& given, const py::object& driver, std::optional<std::size_t> base,
                    std::optional<unsigned> levels, std::optional<double> error, std::optional<double> fidelity,
-                   const std::string& fidelity_from, std::optional<double> max_edge, const std::string& code,
-                   const std::string& precision, unsigned references, bool reorder, unsigned threads,
-                   const py::object& progress) {
+                   const std::string& fidelity_from, std::optional<double> max_edge, const std::string& precision,
+                   bool reorder, unsigned threads, const py::object& progress) {
     if (!driver.is_none()) {
-        if (base || levels || error || fidelity || max_edge || reorder || code != "blend")
+        if (base || levels || error || fidelity || max_edge || reorder)
             refuse("With driver, how coarse the driver is is settled: leave out base, levels, error, fidelity, "
-                   "max_edge, reorder and code.");
+                   "max_edge and reorder.");
         return strip_to(given, driver, precision, threads, progress);
     }
     const MeshPtr mesh = mesh_of(given);
-    StripOptions options{
-        .base = base, .levels = levels, .error = error, .max_edge = max_edge, .references = references};
-    options.code =
-        value_of<DetailCode>(code, "code", {{"blend", DetailCode::blend}, {"reference", DetailCode::reference}});
+    StripOptions options{.base = base, .levels = levels, .error = error, .max_edge = max_edge};
     options.precision = precision_of(precision);
     options.reorder = reorder;
     const LongCall call{threads, progress};
@@ -141,9 +134,6 @@ Made by `strip` and `read_model`; never changes. Pickles as the bytes of its fil
             "finest_level", [](const PyModel& self) { return self.model->finest_level(); },
             "Number of the finest level; 0 is the driver.")
         .def_property_readonly(
-            "code", [](const PyModel& self) { return self.model->code() == DetailCode::blend ? "blend" : "reference"; },
-            "'blend' or 'reference'.")
-        .def_property_readonly(
             "report", [](const PyModel& self) { return self.report; },
             "What `strip` counted and how long it took; empty for a model from a file.")
         .def(
@@ -188,7 +178,7 @@ BadFileError
                     [&](const RunContext& context) { return driver_fidelity(*self.model, context).value(); });
                 py::dict said;
                 said["positions"] = found.positions;
-                if (self.model->code() == DetailCode::blend) said["gradients"] = found.gradients;
+                said["gradients"] = found.gradients;
                 return said;
             },
             py::kw_only(), py::arg("threads") = 0, py::arg("progress") = py::none(),
@@ -200,7 +190,7 @@ What the driver is good for: the largest rms error over bends, a twist, a taper 
 Returns
 -------
 dict
-    'positions': from positions alone; 'gradients' (blend code): with gradients. Fractions of the diagonal.
+    'positions': from positions alone; 'gradients': with gradients. Fractions of the diagonal.
 )")
         .def("__repr__",
              [](const PyModel& self) {
@@ -214,9 +204,9 @@ dict
         "strip", &strip_mesh, py::arg("mesh"), py::kw_only(), py::arg("driver") = py::none(),
         py::arg("base") = py::none(), py::arg("levels") = py::none(), py::arg("error") = py::none(),
         py::arg("fidelity") = py::none(), py::arg("fidelity_from") = "positions", py::arg("max_edge") = py::none(),
-        py::arg("code") = "blend", py::arg("precision") = "float", py::arg("references") = 3,
-        py::arg("reorder") = false, py::arg("threads") = 0, py::arg("progress") = py::none(),
-        R"(strip(mesh, *, driver=None, base=None, levels=None, error=None, fidelity=None, fidelity_from='positions', max_edge=None, code='blend', precision='float', references=3, reorder=False, threads=0, progress=None)
+        py::arg("precision") = "float", py::arg("reorder") = false, py::arg("threads") = 0,
+        py::arg("progress") = py::none(),
+        R"(strip(mesh, *, driver=None, base=None, levels=None, error=None, fidelity=None, fidelity_from='positions', max_edge=None, precision='float', reorder=False, threads=0, progress=None)
 --
 
 Take the detail off a mesh: a model with a light driver.
@@ -241,15 +231,11 @@ fidelity_from : str
     What poses will come with: 'positions', or 'gradients' too.
 max_edge : float, optional
     Longest edge that simplifying may leave, fraction of the diagonal: flat parts keep vertices.
-code : str
-    'blend' for any mesh, 'reference' for the report's, which needs quads with subdivision connectivity.
 precision : str
-    Of the blend code: 'float', 20 bytes a vertex, or 'int16', 10 bytes.
-references : int
-    Of the reference code: 3, 4 or 6 coarse points that a point refers to.
+    'float', 20 bytes a vertex, or 'int16', 10 bytes.
 reorder : bool
     Put the vertices in an order along which neighbours lie together, so that a mesh whose order is hopeless restores
-    faster; the model's `source_order` says where they were. Of the blend code.
+    faster; the model's `source_order` says where they were.
 threads : int
     0: all of the processor's. Results are the same bytes for any.
 progress : callable, optional
@@ -264,7 +250,7 @@ Raises
 UsageError
     Options that make no sense.
 UnsuitableError
-    No vertices; for the reference code, no subdivision connectivity.
+    No vertices.
 Cancelled
     `progress` returned False.
 

@@ -24,11 +24,9 @@ MeshPtr finest_mesh(const std::shared_ptr<const Model>& model);
 
 std::shared_ptr<const Model> model_of(const py::handle& given, const char* name = "model");
 
-/// A pose: one of ours, or positions of shape (d, 3) with what else there is.
-Pose pose_of(const py::handle& pose, const py::handle& gradients, const py::handle& ghosts);
+/// A pose: one of ours, or positions of shape (d, 3), with gradients or none.
+Pose pose_of(const py::handle& pose, const py::handle& gradients);
 /// A sequence of poses: ours, positions of shape (f, d, 3), or a list of poses.
 PoseSequence poses_of(const py::handle& poses, double frames_per_second);
-
-RestoreOptions restore_options(const std::optional<std::string>& law, bool thin_shell, std::optional<unsigned> level);
 
 } // namespace filigree::python

@@ -4,8 +4,7 @@
 #include <filigree/io/file.h>
 #include <filigree/mesh/up_axis.h>
 #include <filigree/present/headless_renderer.h>
-#include <filigree/render/camera.h>
-#include <filigree/render/color_map.h>
+#include <filigree/render.h>
 
 #include <mutex>
 

@@ -4,17 +4,12 @@ namespace filigree::python {
 
 namespace {
 
-Pose make_pose(const py::handle& positions, const py::handle& gradients, const py::handle& ghosts) {
-    Pose pose{points_of(positions, "positions"), {}, {}};
+Pose make_pose(const py::handle& positions, const py::handle& gradients) {
+    Pose pose{points_of(positions, "positions"), {}};
     if (!gradients.is_none()) pose.gradients = gradients_of(gradients, "gradients");
-    if (!ghosts.is_none()) pose.ghosts = points_of(ghosts, "ghosts");
-    const auto check = [&](std::size_t count, const char* what) {
-        if (count != 0 && count != pose.positions.size())
-            refuse(ErrorCode::mismatch, "There are " + std::to_string(pose.positions.size()) + " positions and " +
-                                            std::to_string(count) + " " + what + ".");
-    };
-    check(pose.gradients.size(), "gradients");
-    check(pose.ghosts.size(), "ghosts");
+    if (!pose.gradients.empty() && pose.gradients.size() != pose.positions.size())
+        refuse(ErrorCode::mismatch, "There are " + std::to_string(pose.positions.size()) + " positions and " +
+                                        std::to_string(pose.gradients.size()) + " gradients.");
     return pose;
 }
 
@@ -27,7 +22,7 @@ PoseSequence make_sequence(const py::object& frames, double frames_per_second, c
                                         std::to_string(of_each.size()) + ".");
     for (std::size_t k = 0; k < each.size(); ++k)
         sequence.frames.push_back(
-            pose_of(each[k], gradients.is_none() ? py::object(py::none()) : py::object(of_each[k]), py::none()));
+            pose_of(each[k], gradients.is_none() ? py::object(py::none()) : py::object(of_each[k])));
     return sequence;
 }
 
@@ -35,16 +30,11 @@ py::object gradients_view(const py::object& self) {
     const Pose& pose = self.cast<const Pose&>();
     return pose.gradients.empty() ? py::object(py::none()) : view(pose.gradients, self);
 }
-py::object ghosts_view(const py::object& self) {
-    const Pose& pose = self.cast<const Pose&>();
-    return pose.ghosts.empty() ? py::object(py::none()) : view(pose.ghosts, self);
-}
 
 py::tuple pose_state(const Pose& pose) {
-    return py::make_tuple(take(std::vector(pose.positions)), take(std::vector(pose.gradients)),
-                          take(std::vector(pose.ghosts)));
+    return py::make_tuple(take(std::vector(pose.positions)), take(std::vector(pose.gradients)));
 }
-Pose pose_of_state(const py::tuple& state) { return make_pose(state[0], state[1], state[2]); }
+Pose pose_of_state(const py::tuple& state) { return make_pose(state[0], state[1]); }
 
 /// Frames are looked at and not copied: they keep the sequence.
 py::object frame_of(const py::object& self, py::ssize_t frame) {
@@ -76,10 +66,9 @@ py::array_t<float> all_positions(const PoseSequence& poses) {
 
 } // namespace
 
-Pose pose_of(const py::handle& pose, const py::handle& gradients, const py::handle& ghosts) {
-    if (!py::isinstance<Pose>(pose)) return make_pose(pose, gradients, ghosts);
-    if (!gradients.is_none() || !ghosts.is_none())
-        refuse("A Pose holds its gradients and ghosts; leave the others out, or give positions alone.");
+Pose pose_of(const py::handle& pose, const py::handle& gradients) {
+    if (!py::isinstance<Pose>(pose)) return make_pose(pose, gradients);
+    if (!gradients.is_none()) refuse("A Pose holds its gradients; leave the others out, or give positions alone.");
     return pose.cast<const Pose&>();
 }
 
@@ -98,15 +87,13 @@ positions : array_like, (d, 3)
     Of the driver's vertices, in its order, model units, relative to the mesh's `origin`.
 gradients : array_like, (d, 3, 3), optional
     Deformation gradients, [vertex, row, column]: how a small vector at rest at that vertex has changed.
-ghosts : array_like, (d, 3), optional
-    Where the points off the surface went that `Restorer.rest_ghosts` gives.
 
 Raises
 ------
 UsageError
     Numbers that are not finite, other shapes.
 MismatchError
-    Another number of gradients or ghosts than of positions.
+    Another number of gradients than of positions.
 
 Examples
 --------
@@ -114,11 +101,11 @@ Examples
 >>> pose.positions.dtype, pose.gradients
 (dtype('float32'), None)
 )")
-        .def(py::init([](const py::object& positions, const py::object& gradients, const py::object& ghosts) {
-                 return make_pose(positions, gradients, ghosts);
+        .def(py::init([](const py::object& positions, const py::object& gradients) {
+                 return make_pose(positions, gradients);
              }),
-             py::arg("positions"), py::arg("gradients") = py::none(), py::arg("ghosts") = py::none(),
-             R"(__init__(self, positions, gradients=None, ghosts=None)
+             py::arg("positions"), py::arg("gradients") = py::none(),
+             R"(__init__(self, positions, gradients=None)
 --
 
 )")
@@ -126,7 +113,6 @@ Examples
             "positions", [](const py::object& self) { return view(self.cast<const Pose&>().positions, self); },
             "float32 (d, 3), read-only.")
         .def_property_readonly("gradients", &gradients_view, "float32 (d, 3, 3), read-only; None without.")
-        .def_property_readonly("ghosts", &ghosts_view, "float32 (d, 3), read-only; None without.")
         .def("__len__", [](const Pose& pose) { return pose.positions.size(); })
         .def("__repr__",
              [](const Pose& pose) {

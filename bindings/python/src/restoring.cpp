@@ -18,19 +18,11 @@ struct PyRestorer {
     }
 };
 
-PyRestorer make_restorer(const PyModel& model, const std::optional<std::string>& law, bool thin_shell,
-                         std::optional<unsigned> level) {
-    return {model, restore_options(law, thin_shell, level)};
-}
-
-py::object law_of(const PyRestorer& self) {
-    if (!self.options.law) return py::none();
-    return py::str(std::string(height_law_name(*self.options.law)));
-}
+PyRestorer make_restorer(const PyModel& model, std::optional<unsigned> level) { return {model, {.level = level}}; }
 
 py::object restore_positions(const PyRestorer& self, const py::object& pose, const py::object& gradients,
-                             const py::object& ghosts, const py::object& out, bool world, unsigned threads) {
-    const Pose moved = pose_of(pose, gradients, ghosts);
+                             const py::object& out, bool world, unsigned threads) {
+    const Pose moved = pose_of(pose, gradients);
     const RunContext& context = short_context(threads);
     if (!out.is_none()) {
         if (world) refuse("out takes positions relative to the mesh's origin; leave world out.");
@@ -46,15 +38,14 @@ py::object restore_positions(const PyRestorer& self, const py::object& pose, con
     return take(std::move(in_world));
 }
 
-MeshPtr restore_mesh(const PyRestorer& self, const py::object& pose, const py::object& gradients,
-                     const py::object& ghosts, unsigned threads) {
-    const Pose moved = pose_of(pose, gradients, ghosts);
+MeshPtr restore_mesh(const PyRestorer& self, const py::object& pose, const py::object& gradients, unsigned threads) {
+    const Pose moved = pose_of(pose, gradients);
     const RunContext& context = short_context(threads);
     return without_interpreter([&] { return std::make_shared<Mesh>(self.restorer.mesh(moved, context).value()); });
 }
 
 py::dict expect_error(const PyModel& self, const py::object& pose, unsigned threads) {
-    const Pose moved = pose_of(pose, py::none(), py::none());
+    const Pose moved = pose_of(pose, py::none());
     const RunContext& context = short_context(threads);
     PoseError::Estimate found = without_interpreter([&] {
         check_pose(*self.model, moved).value();
@@ -72,17 +63,6 @@ py::dict expect_error(const PyModel& self, const py::object& pose, unsigned thre
 
 } // namespace
 
-RestoreOptions restore_options(const std::optional<std::string>& law, bool thin_shell, std::optional<unsigned> level) {
-    RestoreOptions options{.thin_shell = thin_shell, .level = level};
-    if (law)
-        options.law = value_of<HeightLaw>(*law, "law",
-                                          {{"keep", HeightLaw::keep},
-                                           {"inverse", HeightLaw::inverse},
-                                           {"proportional", HeightLaw::proportional},
-                                           {"volume", HeightLaw::volume}});
-    return options;
-}
-
 void add_restoring(py::module_& m) {
     py::class_<PyRestorer>(m, "Restorer",
                            R"(Puts the detail back, pose after pose. What does not depend on the pose is prepared once.
@@ -90,18 +70,13 @@ void add_restoring(py::module_& m) {
 Parameters
 ----------
 model : Model
-law : str, optional
-    How high detail is when its surroundings grow: 'keep', 'inverse', 'proportional' or 'volume'. None: proportional
-    for the blend code, inverse for the reference code.
-thin_shell : bool
-    Bumps keep their shape, as on cloth and skin.
 level : int, optional
     Restore up to this level; None: the finest.
 
 Raises
 ------
 UsageError
-    No such level or law.
+    No such level.
 
 Notes
 -----
@@ -115,16 +90,14 @@ Examples
 >>> restorer.positions(2 * model.driver.vertices, out=out) is out
 True
 )")
-        .def(py::init(&make_restorer), py::arg("model"), py::kw_only(), py::arg("law") = py::none(),
-             py::arg("thin_shell") = false, py::arg("level") = py::none(),
-             R"(__init__(self, model, *, law=None, thin_shell=False, level=None)
+        .def(py::init(&make_restorer), py::arg("model"), py::kw_only(), py::arg("level") = py::none(),
+             R"(__init__(self, model, *, level=None)
 --
 
 )")
         .def("positions", &restore_positions, py::arg("pose"), py::arg("gradients") = py::none(), py::kw_only(),
-             py::arg("ghosts") = py::none(), py::arg("out") = py::none(), py::arg("world") = false,
-             py::arg("threads") = 0,
-             R"(positions(self, pose, gradients=None, *, ghosts=None, out=None, world=False, threads=0)
+             py::arg("out") = py::none(), py::arg("world") = false, py::arg("threads") = 0,
+             R"(positions(self, pose, gradients=None, *, out=None, world=False, threads=0)
 --
 
 Positions of the level's vertices.
@@ -135,8 +108,6 @@ pose : Pose, or array_like (d, 3)
     Where the driver is; positions are relative to the mesh's `origin`.
 gradients : array_like, (d, 3, 3), optional
     With positions: how space is deformed at each driver vertex. Without them they are estimated.
-ghosts : array_like, (d, 3), optional
-    With positions: where `rest_ghosts` went, in place of gradients.
 out : ndarray of float32, (n, 3) or flat, optional
     Written in place, in C order; no array is made then.
 world : bool
@@ -157,8 +128,8 @@ UsageError
     Numbers that are not finite; an `out` that cannot be written in place.
 )")
         .def("mesh", &restore_mesh, py::arg("pose"), py::arg("gradients") = py::none(), py::kw_only(),
-             py::arg("ghosts") = py::none(), py::arg("threads") = 0,
-             R"(mesh(self, pose, gradients=None, *, ghosts=None, threads=0)
+             py::arg("threads") = 0,
+             R"(mesh(self, pose, gradients=None, *, threads=0)
 --
 
 The level as a mesh: restored positions, normals where the mesh came with normals, all other attributes as they came.
@@ -166,52 +137,35 @@ Parameters and errors are those of `positions`.
 )")
         .def(
             "gradients",
-            [](const PyRestorer& self, const py::object& pose, const py::object& ghosts, unsigned threads) {
-                const Pose moved = pose_of(pose, py::none(), ghosts);
+            [](const PyRestorer& self, const py::object& pose, unsigned threads) {
+                const Pose moved = pose_of(pose, py::none());
                 const RunContext& context = short_context(threads);
                 return take(without_interpreter([&] { return self.restorer.gradients(moved, context).value(); }));
             },
-            py::arg("pose"), py::kw_only(), py::arg("ghosts") = py::none(), py::arg("threads") = 0,
-            R"(gradients(self, pose, *, ghosts=None, threads=0)
+            py::arg("pose"), py::kw_only(), py::arg("threads") = 0,
+            R"(gradients(self, pose, *, threads=0)
 --
 
-The gradients that a pose is restored with, float32 (d, 3, 3): its own, or estimated from its ghosts or positions.
-None at all, (0, 3, 3), for the reference code.
+The gradients that a pose is restored with, float32 (d, 3, 3): its own, or estimated from its positions.
 )")
         .def_property_readonly(
-            "rest_ghosts",
-            [](const PyRestorer& self) {
-                return take(without_interpreter([&] { return self.restorer.rest_ghosts(); }));
-            },
-            "Where the driver's ghost points are at rest, float32 (d, 3); (0, 3) for the reference code.")
-        .def_property_readonly(
             "model", [](const PyRestorer& self) { return self.model; }, "The model it restores.")
-        .def_property_readonly("law", &law_of, "As it was made with; None: the code's own.")
-        .def_property_readonly(
-            "thin_shell", [](const PyRestorer& self) { return self.options.thin_shell; }, "As it was made with.")
         .def_property_readonly(
             "level", [](const PyRestorer& self) { return self.options.level; },
             "As it was made with; None: the finest.")
         .def("__len__", [](const PyRestorer& self) { return self.restorer.vertex_count(); })
-        .def(py::pickle(
-            [](const PyRestorer& self) {
-                return py::make_tuple(self.model, law_of(self), self.options.thin_shell, self.options.level);
-            },
-            [](const py::tuple& state) {
-                return make_restorer(state[0].cast<PyModel>(), state[1].cast<std::optional<std::string>>(),
-                                     state[2].cast<bool>(), state[3].cast<std::optional<unsigned>>());
-            }));
+        .def(py::pickle([](const PyRestorer& self) { return py::make_tuple(self.model, self.options.level); },
+                        [](const py::tuple& state) {
+                            return make_restorer(state[0].cast<PyModel>(), state[1].cast<std::optional<unsigned>>());
+                        }));
 
     m.def(
         "restore",
-        [](const PyModel& model, const py::object& pose, const py::object& gradients, const py::object& ghosts,
-           const std::optional<std::string>& law, bool thin_shell, std::optional<unsigned> level, unsigned threads) {
-            return restore_mesh(make_restorer(model, law, thin_shell, level), pose, gradients, ghosts, threads);
-        },
+        [](const PyModel& model, const py::object& pose, const py::object& gradients, std::optional<unsigned> level,
+           unsigned threads) { return restore_mesh(make_restorer(model, level), pose, gradients, threads); },
         py::arg("model"), py::arg("pose"), py::arg("gradients") = py::none(), py::kw_only(),
-        py::arg("ghosts") = py::none(), py::arg("law") = py::none(), py::arg("thin_shell") = false,
         py::arg("level") = py::none(), py::arg("threads") = 0,
-        R"(restore(model, pose, gradients=None, *, ghosts=None, law=None, thin_shell=False, level=None, threads=0)
+        R"(restore(model, pose, gradients=None, *, level=None, threads=0)
 --
 
 Put the detail back onto a moved driver, once; for pose after pose make a `Restorer`.
@@ -219,10 +173,12 @@ Put the detail back onto a moved driver, once; for pose after pose make a `Resto
 Parameters
 ----------
 model : Model
-pose, gradients, ghosts
-    As of `Restorer.positions`.
-law, thin_shell, level
-    As of `Restorer`.
+pose : Pose, or array_like (d, 3)
+    Where the driver is; positions are relative to the mesh's `origin`.
+gradients : array_like, (d, 3, 3), optional
+    With positions: how space is deformed at each driver vertex. Without them they are estimated.
+level : int, optional
+    Restore up to this level; None: the finest.
 
 Returns
 -------
@@ -250,8 +206,7 @@ Returns
 -------
 dict
     'rms': fraction of the posed driver's diagonal, within a factor of 2 for nine poses in ten; 'rms_units';
-    'is_too_curved': whether one sees it; 'local_units': around each driver vertex, float32 (d,). All 0 for the
-    reference code.
+    'is_too_curved': whether one sees it; 'local_units': around each driver vertex, float32 (d,).
 )");
 }
 

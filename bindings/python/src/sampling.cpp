@@ -1,10 +1,8 @@
 #include "calls.h"
 #include "meshes.h"
 
+#include <filigree/sample.h>
 #include <filigree/sample/frustum.h>
-#include <filigree/sample/inside_test.h>
-#include <filigree/sample/spacing_for_count.h>
-#include <filigree/sample/spread_inside.h>
 
 namespace filigree::python {
 

@@ -3,8 +3,8 @@
 #include "calls.h"
 #include "models.h"
 
-#include <filigree/physics/grid_limits.h>
-#include <filigree/physics/own_weight.h>
+#include <filigree/physics/grid/grid_limits.h>
+#include <filigree/physics/body/own_weight.h>
 
 #include <cstdio>
 
@@ -24,7 +24,7 @@ struct Attachment {
             refuse("The body that these points went along with was removed.");
     }
     Pose pose() const {
-        Pose pose{std::vector<Vec3f>(count), std::vector<Mat3f>(count), {}};
+        Pose pose{std::vector<Vec3f>(count), std::vector<Mat3f>(count)};
         const RunContext& context = short_context(simulation->threads);
         simulation->alone([&] {
             require();

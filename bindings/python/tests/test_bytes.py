@@ -1,5 +1,7 @@
 """The module's results are the program's, to the byte."""
 
+import pickle
+
 import numpy
 import pytest
 
@@ -36,7 +38,6 @@ def test_make(program):
         (["--error", 1e-3], {"error": 1e-3}),
         (["--fidelity", 1e-3], {"fidelity": 1e-3}),
         (["--max-edge", 0.1], {"max_edge": 0.1}),
-        (["--code", "reference"], {"code": "reference"}),
     ],
 )
 def test_strip(program, mesh, words, options):
@@ -45,13 +46,35 @@ def test_strip(program, mesh, words, options):
     assert is_same_file("ours.fil", "theirs.fil")
 
 
-@pytest.mark.parametrize("words, options", [([], {}), (["--law", "keep", "--thin-shell"], {"law": "keep", "thin_shell": True})])
+@pytest.mark.parametrize("words, options", [([], {}), (["--level", 0], {"level": 0})])
 def test_restore(program, model, words, options):
     filigree.write_model(model, "model.fil")
     moved = model.driver.with_vertices(model.driver.vertices * [1, 1.5, 0.8])
     program("restore", "model.fil", "--pose", write(moved, "pose.ply"), "-o", "theirs.ply", *words)
     write(filigree.restore(model, moved.vertices, **options), "ours.ply")
     assert is_same_file("ours.ply", "theirs.ply")
+
+
+@pytest.mark.parametrize("words, options", [([], {}), (["--references", 6, "--levels", 2], {"references": 6, "levels": 2})])
+def test_the_reference_code(program, words, options):
+    write(filigree.make("wavy-cube", resolution=16), "cube.ply")
+    program("strip", "cube.ply", "-o", "theirs.fil", "--code", "reference", *words)
+    model = filigree.strip_reference(filigree.read_mesh("cube.ply"), **options)
+    assert model.tobytes() == open("theirs.fil", "rb").read()
+    moved = model.driver.with_vertices(model.driver.vertices * [1, 1.5, 0.8])
+    program("restore", "theirs.fil", "--pose", write(moved, "pose.ply"), "-o", "theirs.ply", "--law", "keep", "--level", 1)
+    write(model.restore(moved.vertices, law="keep", level=1), "ours.ply")
+    assert is_same_file("ours.ply", "theirs.ply")
+    again = pickle.loads(pickle.dumps(model))
+    assert again.tobytes() == model.tobytes() and again.finest_level == model.finest_level
+    with pytest.raises(filigree.UnsuitableError, match="reference code"):
+        filigree.read_model("theirs.fil")
+    with pytest.raises(filigree.UnsuitableError, match="blend code"):
+        filigree.ReferenceModel.frombytes(filigree.strip(model.mesh).tobytes())
+    with pytest.raises(filigree.UsageError, match="law is 'murphy'"):
+        model.restore(moved.vertices, law="murphy")
+    with pytest.raises(filigree.MismatchError):
+        model.restore(moved.vertices[:-1])
 
 
 def test_deform(program, mesh, model):

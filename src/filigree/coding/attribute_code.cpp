@@ -2,7 +2,7 @@
 
 #include "filigree/coding/integer_frame.h"
 #include "filigree/coding/wedge.h"
-#include "filigree/mesh/incidence.h"
+#include "filigree/mesh/edges.h"
 
 #include <algorithm>
 #include <bit>
@@ -23,9 +23,8 @@ constexpr unsigned kSizes = 12, kCount = 0, kPlainValue = kCount + 1, kKind = kP
 static_assert(kAttributeEnd <= kAttributeContexts);
 
 constexpr unsigned kPlainBits = 10;
-constexpr std::ptrdiff_t kFewCorners = 16; // at a vertex: they are looked at one by one
-constexpr double kGuessBits = 4;           // what it takes to expect a normal from something else than the last one
-constexpr std::int64_t kOctahedron = 352;  // steps from the middle of an octahedron's square to its border
+constexpr double kGuessBits = 4;          // what it takes to expect a normal from something else than the last one
+constexpr std::int64_t kOctahedron = 352; // steps from the middle of an octahedron's square to its border
 
 Wide wide(const FinePlace& place) { return {place[0], place[1], place[2]}; }
 
@@ -122,10 +121,9 @@ private:
     /// in each face first the corners of vertices that have one.
     template <class T, class CodeValue>
     void walk(CornerAttribute<T>& attribute, bool is_indexed, const CodeValue& code_value) {
-        if (at_vertex_.size() == 0) {
-            for (std::size_t f = 0; f < mesh_.face_count(); ++f)
-                face_of_.insert(face_of_.end(), mesh_.face_size(f), static_cast<Index>(f));
-            find_corners();
+        if (behind_.empty()) {
+            polygons_ = PolygonCorners(mesh_.face_offsets);
+            find_behind();
         }
         const auto count = static_cast<Index>(attribute.values.size());
         std::vector<Index> latest(mesh_.vertex_count(), kNoIndex), known, order;
@@ -194,53 +192,37 @@ private:
         return candidate;
     }
 
-    /// The corner before one in its face.
-    Index corner_before(Index corner) const {
-        const Index face = face_of_[corner], begin = mesh_.face_offsets[face];
-        return (corner == begin ? mesh_.face_offsets[face + 1] : corner) - 1;
-    }
-    Index vertex_before(Index corner) const { return mesh_.corners[corner_before(corner)]; }
-
-    /// The corners at each vertex, ascending; where they are many, those with one vertex before them side by side.
-    void find_corners() {
-        at_vertex_ = corners_at_vertices(mesh_.corners, mesh_.vertex_count());
-        for (Index v = 0; v < mesh_.vertex_count(); ++v) {
-            const auto begin = at_vertex_.items.begin() + at_vertex_.offsets[v],
-                       end = at_vertex_.items.begin() + at_vertex_.offsets[v + 1];
-            if (end - begin <= kFewCorners) continue;
-            std::sort(begin, end, [&](Index a, Index b) {
-                return std::pair(vertex_before(a), a) < std::pair(vertex_before(b), b);
-            });
-        }
-    }
-
-    /// The last corner at `vertex` in the faces before f whose face comes to it from `from`; kNoIndex: there is none.
-    Index last_corner(Index vertex, Index from, std::size_t f) const {
-        const std::span<const Index> corners = at_vertex_[vertex];
-        const Index end = mesh_.face_offsets[f]; // of the corners of earlier faces
-        Index last = kNoIndex;
-        if (std::ptrdiff_t(corners.size()) <= kFewCorners) {
-            for (const Index corner : corners) {
-                if (corner >= end) break;
-                if (vertex_before(corner) == from) last = corner;
-            }
-            return last;
-        }
-        const auto after = std::partition_point(corners.begin(), corners.end(), [&](Index corner) {
-            return std::pair(vertex_before(corner), corner) < std::pair(from, end);
+    /// For each corner, the last corner of an earlier face to which its face comes along the same edge from the other
+    /// end; kNoIndex: there is none.
+    void find_behind() {
+        const auto vertex_before = [&](Index corner) { return mesh_.corners[polygons_.previous(corner)]; };
+        const IndexLists edges = edges_from(mesh_.vertex_count(), [&](const auto& add) {
+            for (Index c = 0; c < mesh_.corner_count(); ++c) add(vertex_before(c), mesh_.corners[c], c);
         });
-        if (after != corners.begin() && vertex_before(after[-1]) == from) last = after[-1];
-        return last;
+        behind_.assign(mesh_.corner_count(), kNoIndex);
+        for (const std::span<const Index> edge : edges) {
+            const Index to = mesh_.corners[edge[0]];
+            const bool is_loop = to == vertex_before(edge[0]);
+            // the last corner at `to`, and at the other end: of earlier faces, and of the face at hand
+            std::array<Index, 2> last = {kNoIndex, kNoIndex}, own = last;
+            for (std::size_t i = 0; i < edge.size(); ++i) {
+                if (i > 0 && polygons_.face(edge[i]) != polygons_.face(edge[i - 1]))
+                    for (std::size_t end = 0; end < 2; ++end)
+                        if (own[end] != kNoIndex) last[end] = std::exchange(own[end], kNoIndex);
+                const std::size_t end = mesh_.corners[edge[i]] != to;
+                behind_[edge[i]] = last[is_loop ? end : 1 - end];
+                own[end] = edge[i];
+            }
+        }
     }
 
     /// Finds, for each edge of a face, its ends as corners of an earlier face: the last one.
     void find_edges(std::size_t f) {
         const auto face = mesh_.face(f);
         edges_.assign(face.size(), {});
-        for (std::size_t k = 0; k < face.size(); ++k) {
-            const Index corner = last_corner(face[k], face[(k + 1) % face.size()], f);
-            if (corner != kNoIndex) edges_[k] = {corner, corner_before(corner)};
-        }
+        for (std::size_t k = 0; k < face.size(); ++k)
+            if (const Index corner = behind_[mesh_.face_offsets[f] + (k + 1) % face.size()]; corner != kNoIndex)
+                edges_[k] = {corner, polygons_.previous(corner)};
     }
 
     /// A face's corners: those of vertices that have a value, then the others.
@@ -419,7 +401,7 @@ private:
         const auto [corner_a, corner_b] = edges_[a];
         if (corner_a == kNoIndex || value_at(corner_a) != value_a || value_at(corner_b) != value_b)
             return {kNoIndex, kNoIndex};
-        const Index g = face_of_[corner_a], begin = mesh_.face_offsets[g], size = mesh_.face_size(g);
+        const Index g = polygons_.face(corner_a), begin = mesh_.face_offsets[g], size = mesh_.face_size(g);
         const Index other = begin + (corner_a - begin + 1) % size;
         if (value_at(other) == kNoIndex) return {kNoIndex, kNoIndex};
         return {mesh_.corners[other], value_at(other)};
@@ -593,9 +575,9 @@ private:
     Code& code_;
     Mesh& mesh_;
     std::span<const FinePlace> places_;
-    IndexLists at_vertex_;       ///< corners
-    std::vector<Index> face_of_; ///< of each corner
-    std::vector<Edge> edges_;    ///< of the face that a walk is at
+    PolygonCorners polygons_;
+    std::vector<Index> behind_; ///< see find_behind
+    std::vector<Edge> edges_;   ///< of the face that a walk is at
     std::uint32_t last_guess_ = 0;
 };
 

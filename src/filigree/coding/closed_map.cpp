@@ -6,34 +6,6 @@ namespace filigree {
 
 namespace {
 
-/// Opposites of half-edges that are alone with one of the other direction at their edge; kNoIndex for others.
-std::vector<Index> pair_half_edges(std::span<const Triangle> triangles) {
-    struct Use {
-        Index low, high, half_edge;
-        bool operator<(const Use& b) const {
-            return low != b.low ? low < b.low : high != b.high ? high < b.high : half_edge < b.half_edge;
-        }
-    };
-    std::vector<Use> uses;
-    uses.reserve(3 * triangles.size());
-    for (std::size_t t = 0; t < triangles.size(); ++t)
-        for (std::size_t k = 0; k < 3; ++k) {
-            const auto [low, high] = std::minmax(triangles[t][k], triangles[t][(k + 1) % 3]);
-            uses.push_back({low, high, static_cast<Index>(3 * t + k)});
-        }
-    std::sort(uses.begin(), uses.end());
-    std::vector<Index> opposite(uses.size(), kNoIndex);
-    const auto origin = [&](Index half_edge) { return triangles[half_edge / 3][half_edge % 3]; };
-    for (std::size_t begin = 0, end = 0; begin < uses.size(); begin = end) {
-        while (end < uses.size() && uses[end].low == uses[begin].low && uses[end].high == uses[begin].high) ++end;
-        const Index a = uses[begin].half_edge, b = uses[end - 1].half_edge;
-        if (end - begin != 2 || origin(a) == origin(b)) continue;
-        opposite[a] = b;
-        opposite[b] = a;
-    }
-    return opposite;
-}
-
 /// Gives every fan of triangles around a vertex a vertex of its own.
 void number_fans(std::span<const Triangle> triangles, ClosedSurface& surface) {
     ClosedMap& map = surface.map;
@@ -48,8 +20,8 @@ void number_fans(std::span<const Triangle> triangles, ClosedSurface& surface) {
             h = map.turn_clockwise(h);
             if (h == half_edge) break;
         }
-        for (Index h = map.opposite[ClosedMap::previous(half_edge)]; h != kNoIndex && map.origin(h) == kNoIndex;
-             h = map.opposite[ClosedMap::previous(h)])
+        for (Index h = map.opposite[previous_half_edge(half_edge)]; h != kNoIndex && map.origin(h) == kNoIndex;
+             h = map.opposite[previous_half_edge(h)])
             map.triangles[h / 3][h % 3] = vertex;
     }
     map.closes_hole.assign(surface.source.size(), false);
@@ -70,7 +42,7 @@ void close_holes(ClosedSurface& surface) {
         const auto first = static_cast<Index>(map.triangles.size());
         for (Index h = start; map.opposite[h] == kNoIndex;) {
             const auto t = static_cast<Index>(map.triangles.size());
-            const Index from = map.origin(h), to = map.origin(ClosedMap::next(h));
+            const Index from = map.origin(h), to = map.origin(next_half_edge(h));
             map.triangles.push_back({to, from, centre});
             map.opposite.insert(map.opposite.end(), {h, kNoIndex, kNoIndex});
             map.opposite[h] = 3 * t;
@@ -90,33 +62,16 @@ void close_holes(ClosedSurface& surface) {
 
 ClosedMap map_of(std::vector<Triangle> triangles, std::vector<bool> closes_hole) {
     ClosedMap map{std::move(triangles), {}, std::move(closes_hole)};
-    const auto count = static_cast<Index>(3 * map.triangles.size());
-    map.opposite.assign(count, kNoIndex);
-    // Half-edges by their lower end: of those of a vertex, few, the ones to the same other end face each other.
-    const auto ends = [&](Index h) {
-        const Index from = map.origin(h), to = map.origin(ClosedMap::next(h));
-        return std::pair(std::min(from, to), std::max(from, to));
-    };
-    std::vector<Index> offsets(map.vertex_count() + 2, 0), sorted(count);
-    for (Index h = 0; h < count; ++h) ++offsets[ends(h).first + 2];
-    for (std::size_t v = 2; v < offsets.size(); ++v) offsets[v] += offsets[v - 1];
-    for (Index h = 0; h < count; ++h) sorted[offsets[ends(h).first + 1]++] = h;
-    for (std::size_t v = 0; v < map.vertex_count(); ++v) {
-        const auto low = sorted.begin() + offsets[v], high = sorted.begin() + offsets[v + 1];
-        std::sort(low, high, [&](Index a, Index b) {
-            const Index to_a = ends(a).second, to_b = ends(b).second;
-            return to_a != to_b ? to_a < to_b : a < b;
-        });
-        for (auto begin = low, end = low; begin != high; begin = end) { // of one edge
-            auto waiting = begin;                                       // the first that has no opposite yet
-            for (; end != high && ends(*end).second == ends(*begin).second; ++end) {
-                if (waiting == end || map.origin(*waiting) == map.origin(*end)) continue;
-                map.opposite[*waiting] = *end;
-                map.opposite[*end] = *waiting;
-                do ++waiting;
-                while (waiting != end && map.opposite[*waiting] != kNoIndex);
-                if (waiting == end) ++waiting; // it has one now
-            }
+    map.opposite.assign(3 * map.triangles.size(), kNoIndex);
+    for (const std::span<const Index> edge : edges_of(map.triangles, map.vertex_count())) {
+        auto waiting = edge.begin(); // the first that has no opposite yet
+        for (auto h = edge.begin(); h != edge.end(); ++h) {
+            if (waiting == h || map.origin(*waiting) == map.origin(*h)) continue;
+            map.opposite[*waiting] = *h;
+            map.opposite[*h] = *waiting;
+            do ++waiting;
+            while (waiting != h && map.opposite[*waiting] != kNoIndex);
+            if (waiting == h) ++waiting; // it has one now
         }
     }
     return map;
@@ -124,7 +79,10 @@ ClosedMap map_of(std::vector<Triangle> triangles, std::vector<bool> closes_hole)
 
 ClosedSurface make_closed_surface(std::span<const Triangle> triangles) {
     ClosedSurface surface;
-    surface.map.opposite = pair_half_edges(triangles);
+    std::size_t vertices = 0;
+    for (const Triangle& t : triangles) vertices = std::max(vertices, std::size_t(std::ranges::max(t)) + 1);
+    const auto run_apart = [&](Index a, Index b) { return runs_up(triangles, a) != runs_up(triangles, b); };
+    surface.map.opposite = pair_half_edges(edges_of(triangles, vertices), 3 * triangles.size(), run_apart);
     number_fans(triangles, surface);
     close_holes(surface);
     return surface;

@@ -2,7 +2,7 @@
 // vertex each, and vertices where several sheets meet taken apart.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/mesh/edges.h"
 
 #include <span>
 #include <vector>
@@ -16,12 +16,9 @@ struct ClosedMap {
     std::vector<bool> closes_hole;   ///< of each vertex: whether it belongs to no mesh
 
     std::size_t vertex_count() const { return closes_hole.size(); }
-    static Index next(Index half_edge) { return half_edge % 3 == 2 ? half_edge - 2 : half_edge + 1; }
-    static Index previous(Index half_edge) { return half_edge % 3 == 0 ? half_edge + 2 : half_edge - 1; }
-    /// Corners lie one after the other, a triangle behind the other: no division is needed.
-    Index origin(Index half_edge) const { return triangles.data()->data()[half_edge]; }
+    Index origin(Index half_edge) const { return half_edge_start(triangles, half_edge); }
     /// The next one from the same vertex, clockwise.
-    Index turn_clockwise(Index half_edge) const { return next(opposite[half_edge]); }
+    Index turn_clockwise(Index half_edge) const { return next_half_edge(opposite[half_edge]); }
     bool is_own(const Triangle& t) const { return !closes_hole[t[0]] && !closes_hole[t[1]] && !closes_hole[t[2]]; }
 };
 

@@ -70,7 +70,7 @@ private:
     void add_planes(Index triangle) {
         const Triangle& t = map_.triangles[triangle];
         for (Index k = 0; k < 3; ++k) // a border's edge stands on a plane of its own
-            if (map_.closes_hole[t[k]]) return add_border(ClosedMap::next(3 * triangle + k));
+            if (map_.closes_hole[t[k]]) return add_border(next_half_edge(3 * triangle + k));
         const Vec3d normal = normal_of(t);
         const double area = normal.norm() / 2;
         if (area <= 0) return;
@@ -80,7 +80,7 @@ private:
         }
     }
     void add_border(Index half_edge) {
-        const Index a = map_.origin(half_edge), b = map_.origin(ClosedMap::next(half_edge));
+        const Index a = map_.origin(half_edge), b = map_.origin(next_half_edge(half_edge));
         const Vec3d along = points_[b] - points_[a];
         const Vec3d across = along.cross(normal_of(map_.triangles[map_.opposite[half_edge] / 3]));
         const double length = across.norm();
@@ -97,7 +97,7 @@ private:
         for (Index h = spoke_[vertex];;) {
             if (ring.size == kLongestRing) return false;
             ring.half_edges[ring.size] = h;
-            ring.ends[ring.size++] = map_.origin(ClosedMap::next(h));
+            ring.ends[ring.size++] = map_.origin(next_half_edge(h));
             h = map_.turn_clockwise(h);
             if (h == spoke_[vertex]) return true;
         }
@@ -161,10 +161,10 @@ private:
     /// later.
     bool collapse_wedges(const Ring& ring, std::size_t to, CollapsedWedges& at_left, CollapsedWedges& at_right) const {
         const Index there = ring.half_edges[to], back = map_.opposite[there];
-        const Index left_moves = map_.opposite[ClosedMap::next(back)], // from the left neighbour to the vertex
-            left_stays = map_.opposite[ClosedMap::previous(back)],
-                    right_moves = map_.opposite[ClosedMap::previous(there)],
-                    right_stays = map_.opposite[ClosedMap::next(there)];
+        const Index left_moves = map_.opposite[next_half_edge(back)], // from the left neighbour to the vertex
+            left_stays = map_.opposite[previous_half_edge(back)],
+                    right_moves = map_.opposite[previous_half_edge(there)],
+                    right_stays = map_.opposite[next_half_edge(there)];
         const auto side = [&](Index own, Index onto, Index third, std::array<Index, 2> moved,
                               std::array<Index, 2> stayed,
                               CollapsedWedges& wedges) { // corners of the triangle; then those of the ones beside it
@@ -175,10 +175,10 @@ private:
             return a.material == b.material && a.has_uv == b.has_uv &&
                    (wedges.moves || (wedge_at_[stayed[0]] == wedges.onto && wedge_at_[stayed[1]] == wedge_at_[third]));
         };
-        if (!side(ClosedMap::next(back), back, ClosedMap::previous(back), {ClosedMap::next(left_moves), left_moves},
-                  {left_stays, ClosedMap::next(left_stays)}, at_left) ||
-            !side(there, ClosedMap::next(there), ClosedMap::previous(there),
-                  {right_moves, ClosedMap::next(right_moves)}, {ClosedMap::next(right_stays), right_stays}, at_right))
+        if (!side(next_half_edge(back), back, previous_half_edge(back), {next_half_edge(left_moves), left_moves},
+                  {left_stays, next_half_edge(left_stays)}, at_left) ||
+            !side(there, next_half_edge(there), previous_half_edge(there), {right_moves, next_half_edge(right_moves)},
+                  {next_half_edge(right_stays), right_stays}, at_right))
             return false;
         if (at_left.own == kNoIndex && at_right.own == kNoIndex) return false;
         if (at_left.own != kNoIndex && at_right.own != kNoIndex &&
@@ -231,8 +231,8 @@ private:
         const Index onto = ring.ends[to];
         VertexCollapse made{vertex,
                             onto,
-                            map_.origin(ClosedMap::previous(back)),
-                            map_.origin(ClosedMap::previous(there)),
+                            map_.origin(previous_half_edge(back)),
+                            map_.origin(previous_half_edge(there)),
                             static_cast<Index>(ring.size - 2),
                             there,
                             back};
@@ -245,9 +245,9 @@ private:
         }
         for (std::size_t k = 0; k < ring.size; ++k)
             map_.triangles[ring.half_edges[k] / 3][ring.half_edges[k] % 3] = onto;
-        const Index right_in = map_.opposite[ClosedMap::next(there)],
-                    right_out = map_.opposite[ClosedMap::previous(there)],
-                    left_in = map_.opposite[ClosedMap::next(back)], left_out = map_.opposite[ClosedMap::previous(back)];
+        const Index right_in = map_.opposite[next_half_edge(there)],
+                    right_out = map_.opposite[previous_half_edge(there)], left_in = map_.opposite[next_half_edge(back)],
+                    left_out = map_.opposite[previous_half_edge(back)];
         glue(right_in, right_out);
         glue(left_in, left_out);
         is_alive_[there / 3] = is_alive_[back / 3] = false;

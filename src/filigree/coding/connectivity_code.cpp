@@ -224,7 +224,7 @@ public:
 
     std::uint32_t degree(unsigned context, Index known) {
         current_ = behind(known);
-        const Index third = map_.origin(ClosedMap::previous(current_));
+        const Index third = map_.origin(previous_half_edge(current_));
         if (number_[third] != kNoIndex) {
             out_.symbol(context, kJoin);
             return kJoin;
@@ -238,7 +238,7 @@ public:
     /// The node at the third corner that has this triangle on its unknown side.
     Index join(std::size_t nodes) {
         left_ = 0;
-        Index h = map_.turn_clockwise(ClosedMap::previous(current_));
+        Index h = map_.turn_clockwise(previous_half_edge(current_));
         for (; is_inside(h); h = map_.turn_clockwise(h)) ++left_;
         out_.number(kWhere, static_cast<std::uint32_t>(nodes - 1 - node_[h]));
         return node_[h];
@@ -253,7 +253,7 @@ private:
     Index behind(Index known) const {
         const Index first = half_edges[known / 3];
         Index half_edge = first;
-        for (Index k = 0; k < known % 3; ++k) half_edge = ClosedMap::next(half_edge);
+        for (Index k = 0; k < known % 3; ++k) half_edge = next_half_edge(half_edge);
         return map_.opposite[half_edge];
     }
     /// Whether neither side of an edge is known. What lies right of the border's edges is known.

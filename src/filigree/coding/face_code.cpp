@@ -101,7 +101,7 @@ public:
                 walked.corners.push_back(walked.number[map.origin(h)]);
                 walked.half_edges.push_back(h);
                 if (walked.corners.size() - begin > 3 * map.triangles.size()) return false;
-                for (h = ClosedMap::next(h); cuts[h]; h = ClosedMap::next(map.opposite[h])) {
+                for (h = next_half_edge(h); cuts[h]; h = next_half_edge(map.opposite[h])) {
                     is_done[map.opposite[h] / 3] = true;
                     if (h == start) return false;
                 }
@@ -131,7 +131,7 @@ private:
         Index h = half_edge;
         for (std::size_t turn = 0; turn < map.opposite.size(); ++turn) {
             if (!cuts[h]) return h;
-            h = ClosedMap::next(map.opposite[h]);
+            h = next_half_edge(map.opposite[h]);
         }
         return kNoIndex;
     }
@@ -140,11 +140,11 @@ private:
 /// Whether an edge is expected to be a cut: in a grid a triangle and its neighbour are each other turned by half a
 /// turn, so their cuts lie alike beside the edge that they share. 0: it is, 1: it is not, 2: no neighbour tells.
 unsigned expectation(const ClosedMap& map, const std::vector<bool>& cuts, Index half_edge) {
-    for (const Index shared : {ClosedMap::next(half_edge), ClosedMap::previous(half_edge)}) {
+    for (const Index shared : {next_half_edge(half_edge), previous_half_edge(half_edge)}) {
         const Index other = map.opposite[shared];
         if (other > half_edge || !map.is_own(map.triangles[other / 3])) continue; // not known yet, or of a hole
-        if (cuts[ClosedMap::next(other)]) return ClosedMap::next(shared) == half_edge ? 0 : 1;
-        if (cuts[ClosedMap::previous(other)]) return ClosedMap::previous(shared) == half_edge ? 0 : 1;
+        if (cuts[next_half_edge(other)]) return next_half_edge(shared) == half_edge ? 0 : 1;
+        if (cuts[previous_half_edge(other)]) return previous_half_edge(shared) == half_edge ? 0 : 1;
     }
     return 2;
 }
@@ -202,7 +202,7 @@ EncodedFaces encode_faces(std::span<const Index> face_offsets, std::span<const I
     WalkedFaces& walked = encoded.walked;
     const auto source_of = [&](Index half_edge) { // in the surface's map
         Index source = walk.half_edge[half_edge / 3];
-        for (Index k = 0; k < half_edge % 3; ++k) source = ClosedMap::next(source);
+        for (Index k = 0; k < half_edge % 3; ++k) source = next_half_edge(source);
         return source;
     };
     out.symbol(kPlain, all_triangles);

@@ -67,14 +67,14 @@ private:
     void visit_first(Index v, Index last) {
         Index near = last;
         for (Index h = spoke_[v];;) {
-            if (is_own(ClosedMap::next(h))) near = map_.origin(ClosedMap::next(h));
+            if (is_own(next_half_edge(h))) near = map_.origin(next_half_edge(h));
             h = map_.turn_clockwise(h);
             if (h == spoke_[v]) break;
         }
         const SteppedPlace from = near != kNoIndex ? known_[near] : SteppedPlace{};
         code(v, reals(from.place), SurfaceFrame(), std::uint32_t(from.size), 0);
         for (Index h = spoke_[v];;) {
-            if (is_own(ClosedMap::next(h)) && is_own(ClosedMap::previous(h)))
+            if (is_own(next_half_edge(h)) && is_own(previous_half_edge(h)))
                 for (Index k = 0; k < 3; ++k) tell_across(h / 3 * 3 + k);
             h = map_.turn_clockwise(h);
             if (h == spoke_[v]) break;
@@ -112,8 +112,8 @@ private:
              mean, std::min<unsigned>(beside.count, kSupport) - 1);
         for (std::uint32_t i = 0; i < beside.count; ++i) { // between each of them and v there is one that is known now
             const Index h = map_.opposite[beside.half_edges[i]];
-            tell_across(ClosedMap::next(h));
-            tell_across(ClosedMap::previous(h));
+            tell_across(next_half_edge(h));
+            tell_across(previous_half_edge(h));
         }
     }
 
@@ -129,7 +129,7 @@ private:
     /// What lies across a half-edge of a triangle that has become known. What is known itself is told in vain, and its
     /// place in the turns taken by the next: which it is cannot be guessed.
     void tell_across(Index half_edge) {
-        const Index w = map_.origin(ClosedMap::previous(map_.opposite[half_edge]));
+        const Index w = map_.origin(previous_half_edge(map_.opposite[half_edge]));
         Beside& beside = around_[w];
         beside.half_edges[std::min<std::size_t>(beside.count, kMostBeside - 1)] = half_edge;
         beside.count = std::min<std::uint32_t>(beside.count + 1, kMostBeside);

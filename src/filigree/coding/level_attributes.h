@@ -20,8 +20,8 @@ struct SurfaceAttributes {
     /// Whether a half-edge lies between wedges that differ.
     bool is_seam(const ClosedMap& map, Index half_edge) const {
         const Index back = map.opposite[half_edge];
-        return wedge_at[half_edge] != wedge_at[ClosedMap::next(back)] ||
-               wedge_at[ClosedMap::next(half_edge)] != wedge_at[back];
+        return wedge_at[half_edge] != wedge_at[next_half_edge(back)] ||
+               wedge_at[next_half_edge(half_edge)] != wedge_at[back];
     }
 };
 

@@ -193,7 +193,7 @@ private:
             Index h = spokes[v];
             do {
                 const Index next = map.turn_clockwise(h);
-                ring.push_back({map.origin(ClosedMap::next(h)), wedge_at[next]});
+                ring.push_back({map.origin(next_half_edge(h)), wedge_at[next]});
                 h = next;
             } while (h != spokes[v]);
             set_ring(v, std::move(ring));

@@ -106,7 +106,7 @@ struct BaseWriter {
     bool is_damaged() const { return false; }
     Index wedge_at(Index half_edge) const {
         Index source = coarsest.half_edge[half_edge / 3];
-        for (Index k = 0; k < half_edge % 3; ++k) source = ClosedMap::next(source);
+        for (Index k = 0; k < half_edge % 3; ++k) source = next_half_edge(source);
         return coarsening.wedge_at[source];
     }
     std::uint32_t bits(std::uint32_t value, unsigned count) {
@@ -158,10 +158,10 @@ std::vector<Index> find_half_edges(std::span<const Triangle> triangles, std::spa
                             of_source.begin());
         const Index to = of_source[(k + 1) % 3], third = of_source[(k + 2) % 3];
         Index h = spokes[of_source[k]];
-        while (is_taken[h / 3] || map.origin(ClosedMap::next(h)) != to || map.origin(ClosedMap::previous(h)) != third)
+        while (is_taken[h / 3] || map.origin(next_half_edge(h)) != to || map.origin(previous_half_edge(h)) != third)
             h = map.turn_clockwise(h);
         is_taken[h / 3] = true;
-        for (; k > 0; --k) h = ClosedMap::previous(h); // back to the first corner
+        for (; k > 0; --k) h = previous_half_edge(h); // back to the first corner
         found.push_back(h);
     }
     return found;

@@ -1,13 +1,12 @@
 #include "filigree/coding/lossless_numbers.h"
 
 #include "filigree/coding/symbols.h"
+#include "filigree/mesh/edges.h"
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
-#include <numeric>
-#include <tuple>
 
 namespace filigree {
 
@@ -207,65 +206,26 @@ std::optional<std::vector<std::uint32_t>> decode_numbers(std::string_view stream
 
 namespace {
 
-/// Faces corner by corner: which corner comes next, what is at a vertex, and which triangle runs along an edge.
-class CornerWalk {
-public:
-    /// corners beyond `vertices` are at none.
-    CornerWalk(std::span<const Index> face_offsets, std::span<const Index> corners, std::size_t vertices)
-        : corners_(corners), begin_(corners.size()), end_(corners.size()), first_(vertices + 1, 0) {
-        for (std::size_t f = 0; f + 1 < face_offsets.size(); ++f)
-            for (Index c = face_offsets[f]; c < face_offsets[f + 1]; ++c) {
-                begin_[c] = face_offsets[f];
-                end_[c] = face_offsets[f + 1];
-                if (corners[c] < vertices) ++first_[corners[c] + 1];
-            }
-        std::inclusive_scan(first_.begin(), first_.end(), first_.begin());
-        at_.resize(corners.size());
-        std::vector<Index> end(first_.begin(), first_.end() - 1);
-        for (Index c = 0; c < corners.size(); ++c)
-            if (corners[c] < vertices) at_[end[corners[c]]++] = c;
-        along_ = at_;
-        for (std::size_t v = 0; v < vertices; ++v)
-            if (first_[v + 1] - first_[v] > kFewCorners)
-                std::sort(along_.begin() + first_[v], along_.begin() + first_[v + 1],
-                          [&](Index a, Index b) { return key(a) < key(b); });
+/// For each corner of a triangle the vertex beyond the edge across from it, in the first triangle that runs back along
+/// that edge; kNoIndex: there is none, or an end of the edge is not below `vertices`.
+std::vector<Index> vertices_beyond(const PolygonCorners& polygons, std::span<const Index> corners,
+                                   std::size_t vertices) {
+    const auto from = [&](Index c) { return corners[polygons.next(c)]; };
+    const auto to = [&](Index c) { return corners[polygons.previous(c)]; };
+    const IndexLists edges = edges_from(vertices, [&](const auto& add) { // named by the corner across
+        for (Index c = 0; c < polygons.count(); ++c)
+            if (polygons.size(c) == 3 && std::max(from(c), to(c)) < vertices) add(from(c), to(c), c);
+    });
+    std::vector<Index> beyond(corners.size(), kNoIndex);
+    for (const std::span<const Index> edge : edges) {
+        const Index end = to(edge[0]);
+        const auto runs_back = [&](Index c) { return to(c) != end || from(c) == end; };
+        const auto back = std::ranges::find_if(edge, runs_back);
+        for (const Index c : edge)
+            if (const auto first = to(c) == end ? back : edge.begin(); first != edge.end()) beyond[c] = corners[*first];
     }
-
-    std::span<const Index> at(Index vertex) const { return list(at_, vertex); }
-    Index size(Index corner) const { return end_[corner] - begin_[corner]; } ///< of its face
-    Index next(Index corner) const { return corner + 1 < end_[corner] ? corner + 1 : begin_[corner]; }
-    Index previous(Index corner) const { return (corner > begin_[corner] ? corner : end_[corner]) - 1; }
-
-    /// The vertex across the edge from `from` to `to`: of the first triangle that runs along it; kNoIndex: none does.
-    Index across(Index from, Index to) const {
-        const std::span<const Index> along = list(along_, from);
-        auto found = along.begin();
-        if (along.size() > kFewCorners) {
-            found = std::partition_point(along.begin(), along.end(),
-                                         [&](Index c) { return key(c) < std::tuple(false, to, Index{0}); });
-            if (found == along.end() || size(*found) != 3 || corners_[next(*found)] != to) return kNoIndex;
-        } else {
-            found = std::find_if(found, along.end(), [&](Index c) { return size(c) == 3 && corners_[next(c)] == to; });
-            if (found == along.end()) return kNoIndex;
-        }
-        return corners_[previous(*found)];
-    }
-
-private:
-    static constexpr std::size_t kFewCorners = 16; // at a vertex: they are looked at one by one
-
-    /// Triangles first, by where their edge leads to, in their order.
-    std::tuple<bool, Index, Index> key(Index corner) const {
-        return {size(corner) != 3, corners_[next(corner)], corner};
-    }
-    std::span<const Index> list(const std::vector<Index>& items, Index vertex) const {
-        return std::span(items).subspan(first_[vertex], first_[vertex + 1] - first_[vertex]);
-    }
-
-    std::span<const Index> corners_;
-    std::vector<Index> begin_, end_;        ///< of each corner's face
-    std::vector<Index> first_, at_, along_; ///< of each vertex its corners: ascending; sorted by `key` where many
-};
+    return beyond;
+}
 
 } // namespace
 
@@ -273,16 +233,21 @@ std::vector<Expectation> vertex_expectations(std::span<const Index> face_offsets
                                              std::size_t vertices, std::size_t block) {
     std::vector<Expectation> expected(vertices);
     if (face_offsets.size() < 2) return expected;
-    const CornerWalk walk(face_offsets, corners, vertices);
+    const PolygonCorners polygons(face_offsets);
+    const std::vector<Index> beyond = vertices_beyond(polygons, corners, vertices);
+    const IndexLists at = make_lists<Index>(vertices, [&](const auto& add) {
+        for (Index c = 0; c < polygons.count(); ++c)
+            if (corners[c] < vertices) add(corners[c], c);
+    });
     for (Index v = 0; v < vertices; ++v) {
         const auto is_known = [&](Index u) { return u < v && u / block == v / block; };
         Expectation& best = expected[v];
-        for (const Index c : walk.at(v)) {
-            const Index to = corners[walk.next(c)], from = corners[walk.previous(c)];
+        for (const Index c : at[v]) {
+            const Index to = corners[polygons.next(c)], from = corners[polygons.previous(c)];
             if (is_known(to) && (best.near == kNoIndex || to > best.near)) best.near = to;
             if (is_known(from) && (best.near == kNoIndex || from > best.near)) best.near = from;
-            if (!is_known(to) || !is_known(from) || walk.size(c) > 4) continue;
-            const Index behind = walk.size(c) == 4 ? corners[walk.next(walk.next(c))] : walk.across(from, to);
+            if (!is_known(to) || !is_known(from) || polygons.size(c) > 4) continue;
+            const Index behind = polygons.size(c) == 4 ? corners[polygons.next(polygons.next(c))] : beyond[c];
             if (is_known(behind)) best = {from, to, behind};
             if (best.across != kNoIndex) break;
         }

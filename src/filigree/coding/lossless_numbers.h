@@ -20,8 +20,8 @@ struct Expectation {
 };
 
 /// Of each vertex of faces, the parallelogram over vertices with lower numbers beside it. vertices: how many there are;
-/// corners beyond them are passed over. block: only vertices of the same block of so many count. Cost O(corners), and
-/// O(log d) for each corner at a vertex with d corners.
+/// corners beyond them are passed over. block: only vertices of the same block of so many count. Cost O(vertices
+/// + corners log d) where at most d corners are at a vertex.
 std::vector<Expectation> vertex_expectations(std::span<const Index> face_offsets, std::span<const Index> corners,
                                              std::size_t vertices, std::size_t block);
 

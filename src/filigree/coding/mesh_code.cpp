@@ -6,6 +6,7 @@
 #include "filigree/coding/integer_frame.h"
 #include "filigree/coding/mesh_levels.h"
 #include "filigree/coding/regular_code.h"
+#include "filigree/mesh/morton.h"
 
 #include <algorithm>
 #include <cmath>
@@ -136,20 +137,14 @@ std::vector<Index> read_permutation(SymbolReader& in, unsigned context, std::siz
     return order;
 }
 
-std::vector<Index> inverse_of(std::span<const Index> order) {
-    std::vector<Index> inverse(order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) inverse[order[i]] = static_cast<Index>(i);
-    return inverse;
-}
-
 /// Back into the order of the source.
 Mesh put_back(const Mesh& mesh, std::string_view stream) {
     SymbolReader in(stream, kOrderContexts);
     const std::vector<Index> vertex = read_permutation(in, kVertexOrder, mesh.vertex_count()),
                              face = read_permutation(in, kFaceOrder, mesh.face_count());
     OrderedMesh back; // what it was coded from is what comes out: vertex i is the code's back.vertex[i]
-    back.vertex = inverse_of(vertex);
-    back.face = inverse_of(face);
+    back.vertex = inverse_order(vertex);
+    back.face = inverse_order(face);
     back.first_corner.resize(face.size());
     for (std::size_t f = 0; f < face.size(); ++f) { // the code's face f began with corner k of the source's
         const std::uint32_t k = in.number(kFirstCorner), size = mesh.face_size(f);
@@ -171,12 +166,9 @@ Mesh put_back(const Mesh& mesh, std::string_view stream) {
 void sort_loose(const Mesh& mesh, const CodedMesh& coded, std::span<Index> loose) {
     std::vector<std::pair<std::uint64_t, Index>> keys;
     for (const Index v : loose) {
-        const FinePlace place = fine_place(mesh.positions[v], coded);
-        std::uint64_t key = 0;
-        for (unsigned bit = 0; bit < 20; ++bit)
-            for (std::size_t k = 0; k < 3; ++k)
-                key |= std::uint64_t(std::uint32_t(place[k]) >> bit & 1) << (3 * bit + k);
-        keys.emplace_back(key, v);
+        constexpr std::uint32_t kCounted = (1u << 20) - 1; // bits of a coordinate
+        const auto [x, y, z] = fine_place(mesh.positions[v], coded);
+        keys.emplace_back(morton_key(x & kCounted, y & kCounted, z & kCounted), v);
     }
     std::ranges::sort(keys);
     for (std::size_t i = 0; i < loose.size(); ++i) loose[i] = keys[i].second;

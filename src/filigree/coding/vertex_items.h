@@ -1,7 +1,7 @@
 // Which of a vertex's items is like another, in constant time however many the vertex has.
 #pragma once
 
-#include "filigree/core/random.h"
+#include "filigree/core/hash.h"
 #include "filigree/core/types.h"
 
 #include <unordered_map>
@@ -47,9 +47,8 @@ private:
     };
     struct Hash {
         std::size_t operator()(const Named& named) const {
-            std::uint64_t hash = named.vertex;
-            for (const std::int32_t x : named.key) hash = random_bits(hash, std::uint32_t(x));
-            return hash;
+            const auto& [a, b, c, d] = named.key;
+            return hash_words(named.vertex, a, b, c, d);
         }
     };
 

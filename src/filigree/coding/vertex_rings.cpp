@@ -22,8 +22,7 @@ VertexRings::VertexRings(const ClosedMap& map, std::span<const FinePlace> places
         }
         LongRing ring;
         Index h = spokes[v];
-        for (std::size_t i = 0; i < degrees[v]; ++i, h = map.turn_clockwise(h))
-            ring[i] = map.origin(ClosedMap::next(h));
+        for (std::size_t i = 0; i < degrees[v]; ++i, h = map.turn_clockwise(h)) ring[i] = map.origin(next_half_edge(h));
         if (degrees[v] > 0) set(v, ring[0], ring.data() + 1, degrees[v] - 1);
     }
     for (const Triangle& t : map.triangles)

@@ -58,9 +58,6 @@ private:
 Status check(const StripOptions& options, const FidelityGoal& goal) {
     if (!(goal.error > 0) || !std::isfinite(goal.error))
         return Error{ErrorCode::usage, "A fidelity has to be above 0, a fraction of the diagonal."};
-    if (options.code != DetailCode::blend)
-        return Error{ErrorCode::usage,
-                     "Fidelity belongs to the blend code; the reference code's driver follows from the mesh."};
     if (options.base || options.levels || options.error)
         return Error{ErrorCode::usage, "Fidelity says how fine the driver is; say no base, levels or error beside it."};
     return Success{};
@@ -103,19 +100,14 @@ Result<double> fidelity(const Model& model, PoseSource source, const RunContext&
 }
 
 Result<DriverFidelity> driver_fidelity(const Model& model, const RunContext& context) {
-    if (model.code() != DetailCode::blend) {
-        const Result<double> error = fidelity(model, PoseSource::positions, context);
-        if (!error) return error.error();
-        return DriverFidelity{*error, *error};
-    }
     const SampledRestorer restorer(model, kMostMeasured, context);
-    const GradientFit fit(level_mesh(model, 0), NormalColumn::fitted, context);
+    const GradientFit fit(level_mesh(model, 0), context);
     DriverFidelity largest;
     for (const NamedWarp& named : fidelity_warps(world_bounds(model.mesh))) {
         if (named.affine) continue;
         const Pose pose = warp_pose(*named.warp, model, context);
         const std::vector<Vec3f> truth = warp_positions(*named.warp, restorer.rest(), model.mesh.origin, context);
-        const std::vector<Mat3f> fitted = fit.fit(pose.positions, HeightLaw::proportional, context);
+        const std::vector<Mat3f> fitted = fit.fit(pose.positions, context);
         if (context.is_cancelled()) return cancelled_error();
         const double diagonal = bounds(truth).diagonal();
         if (!(diagonal > 0)) continue;

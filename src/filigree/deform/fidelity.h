@@ -32,9 +32,8 @@ struct DriverFidelity {
     double positions = 0, gradients = 0;
 };
 
-/// fidelity() from both sources, over all vertices of a blend model or 65,536 drawn evenly from more: within a few
-/// per cent then. A reference model has no use for gradients; both are the same then. Errors: cancelled. Cost: a
-/// GradientFit of the driver, and twelve restores of the vertices that are drawn.
+/// fidelity() from both sources, over all vertices or 65,536 drawn evenly from more: within a few per cent then.
+/// Errors: cancelled. Cost: a GradientFit of the driver, and twelve restores of the vertices that are drawn.
 Result<DriverFidelity> driver_fidelity(const Model& model, const RunContext& context);
 
 struct FidelityGoal {
@@ -50,9 +49,9 @@ struct StrippedToFidelity {
 
 /// Strips with the smallest driver, to within 15 % of its vertices, whose fidelity is 1.4 times as good as the goal:
 /// so other warps that are nowhere more curved are restored as well as asked too (`filigree bench goals`). The whole
-/// mesh where nothing less will do; then `error` may be above the goal, which is below float's rounding. options: of
-/// the blend code, and none that says how coarse. Errors: as of strip; usage (the reference code, a size given, a goal
-/// that is not above 0). Cost: about six times strip and fidelity.
+/// mesh where nothing less will do; then `error` may be above the goal, which is below float's rounding. options: none
+/// that says how coarse. Errors: as of strip; usage (a size given, a goal that is not above 0). Cost: about six times
+/// strip and fidelity.
 Result<StrippedToFidelity> strip_to_fidelity(const Mesh& mesh, const StripOptions& options, const FidelityGoal& goal,
                                              const RunContext& context);
 

@@ -41,7 +41,7 @@ struct PullTargets {
 class GrabbedVertex {
 public:
     GrabbedVertex(const Model& model, Index vertex, const Pose* start)
-        : restorer_(std::get<BlendDetail>(model.detail), model.mesh.positions, model.driver().vertices,
+        : restorer_(model.detail, model.mesh.positions, model.driver().vertices,
                     std::array{BlendRestorer::Item{vertex, 0}}, {}, RunContext(1)),
           start_(start ? place(*start) : model.mesh.positions[vertex]) {}
     /// From where it started.
@@ -57,15 +57,14 @@ private:
     Vec3f start_;
 };
 
-/// The driver vertices that carry a vertex of the finest mesh, ascending; none for the reference code.
+/// The driver vertices that carry a vertex of the finest mesh, ascending.
 std::vector<Index> carriers(const Model& model, Index vertex) {
-    const auto* detail = std::get_if<BlendDetail>(&model.detail);
-    if (!detail) return {};
-    const auto record = std::find(detail->order.begin(), detail->order.end(), vertex) - detail->order.begin();
-    const auto next = std::upper_bound(detail->cell_offsets.begin(), detail->cell_offsets.end(), record);
-    const auto cell = static_cast<std::size_t>(next - detail->cell_offsets.begin() - 1);
-    if (cell >= detail->cells.size()) return {};
-    std::vector<Index> result(detail->cells[cell].begin(), detail->cells[cell].end());
+    const BlendDetail& detail = model.detail;
+    const auto record = std::find(detail.order.begin(), detail.order.end(), vertex) - detail.order.begin();
+    const auto next = std::upper_bound(detail.cell_offsets.begin(), detail.cell_offsets.end(), record);
+    const auto cell = static_cast<std::size_t>(next - detail.cell_offsets.begin() - 1);
+    if (cell >= detail.cells.size()) return {};
+    std::vector<Index> result(detail.cells[cell].begin(), detail.cells[cell].end());
     std::sort(result.begin(), result.end());
     return result;
 }
@@ -189,7 +188,7 @@ Result<PullSolver> PullSolver::create(const Model& model, const Pose* start, con
     if (!targets) return targets.error();
     const double off_pointer = Solver::kOffPointer * bounds(model.mesh.positions).diagonal();
     auto solver = std::make_unique<Solver>(Solver{std::move(*targets), start, {}, off_pointer});
-    const bool is_known = model.code() == DetailCode::blend && (!start || !start->gradients.empty());
+    const bool is_known = !start || !start->gradients.empty();
     if (grabbed && is_known) solver->grabbed.emplace(model, *grabbed, start);
     return PullSolver(std::move(solver));
 }

@@ -24,8 +24,6 @@ constexpr std::size_t kSpaceWarpGrain = 4096; // points a piece: long enough to 
 constexpr double kThin = 1e-9;                // of the diagonal; a box shorter than this has no length to bend along
 constexpr double kBumpDeviation = 0.35;       // of the diagonal
 
-double in_radians(double degrees) { return degrees * (std::numbers::pi / 180); }
-
 /// A warp from one formula for position and gradient. Where only the position is asked for, the compiler drops the
 /// rest.
 template <class Formula>
@@ -230,7 +228,7 @@ Result<std::unique_ptr<SpaceWarp>> make_squeeze(const Box& box, Axis axis, doubl
 std::unique_ptr<SpaceWarp> make_bend(const Box& box, Axis axis, double degrees) {
     const AxisBasis f(box, axis);
     if (f.thin) return make_identity();
-    return make_warp([f, curvature = in_radians(degrees) / f.length](const Vec3d& p) {
+    return make_warp([f, curvature = radians(degrees) / f.length](const Vec3d& p) {
         const double x = f.clamp(p[f.along]) - f.centre[f.along], beyond = p[f.along] - f.centre[f.along] - x;
         const double y = p[f.across] - f.centre[f.across];
         // An arc of length x that turns by 2 h has a chord of length x sin(h) / h in the direction h.
@@ -253,7 +251,7 @@ std::unique_ptr<SpaceWarp> make_bend(const Box& box, Axis axis, double degrees) 
 std::unique_ptr<SpaceWarp> make_twist(const Box& box, Axis axis, double degrees) {
     const AxisBasis f(box, axis);
     if (f.thin) return make_identity();
-    return make_warp([f, rate = in_radians(degrees) / f.length](const Vec3d& p) {
+    return make_warp([f, rate = radians(degrees) / f.length](const Vec3d& p) {
         const double angle = rate * (f.clamp(p[f.along]) - f.centre[f.along]);
         const double sine = std::sin(angle), cosine = std::cos(angle);
         const double y = p[f.across] - f.centre[f.across], z = p[f.across2] - f.centre[f.across2];

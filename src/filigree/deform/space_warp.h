@@ -6,6 +6,7 @@
 #pragma once
 
 #include "filigree/core/run_context.h"
+#include "filigree/core/view.h"
 #include "filigree/hierarchy/model.h"
 #include "filigree/mesh/mesh.h"
 
@@ -30,8 +31,6 @@ public:
     virtual Vec3d position(const Vec3d& point) const = 0;
     virtual Warped warp(const Vec3d& point) const = 0;
 };
-
-enum class Axis { x, y, z };
 
 /// The axis along which the box is longest; the first of those that are equal.
 Axis longest_axis(const Box& box);

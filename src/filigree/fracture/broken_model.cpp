@@ -1,4 +1,5 @@
 #include "filigree/fracture/broken_model.h"
+#include "filigree/fracture.h"
 
 #include "filigree/fracture/crack_surfaces.h"
 #include "filigree/fracture/planar_fill.h"
@@ -95,8 +96,7 @@ struct PlaceBond {
 class ModelBreaker {
 public:
     ModelBreaker(const Model& model, const FracturedMesh& fractured, const FractureCells& cells, double spacing)
-        : model_(model), detail_(std::get<BlendDetail>(model.detail)), fractured_(fractured), cells_(cells),
-          spacing_(spacing) {
+        : model_(model), detail_(model.detail), fractured_(fractured), cells_(cells), spacing_(spacing) {
         broken_.model.mesh = fractured.mesh;
     }
 
@@ -349,8 +349,6 @@ private:
 
 Result<BrokenModel> break_model(const Model& model, const FracturedMesh& fractured, const FractureCells& cells,
                                 double crack_spacing, const RunContext& context) {
-    if (model.code() != DetailCode::blend)
-        return Error{ErrorCode::unsuitable, "Only models of the blend code break; strip the mesh with it."};
     if (fractured.mesh.vertex_count() < model.mesh.vertex_count() ||
         !std::equal(model.mesh.positions.begin(), model.mesh.positions.end(), fractured.mesh.positions.begin()))
         return Error{ErrorCode::unsuitable, "The pieces are those of another mesh than the model's."};

@@ -1,7 +1,7 @@
-// A model that breaks: bound once, whole, and moved piece by piece.
+// A model that breaks: it is bound once, as a whole, and moves piece by piece.
 #pragma once
 
-#include "filigree/fracture/fracture.h"
+#include "filigree/fracture.h"
 #include "filigree/hierarchy/model.h"
 #include "filigree/hierarchy/pose.h"
 
@@ -17,10 +17,11 @@ struct BrokenModel {
     std::vector<std::uint8_t> driver_is_on_crack; ///< whether it is a point on a crack, and not of the unbroken driver
 };
 
-/// model: a blend model. fractured: its mesh, broken with pieces_are_cells. crack_spacing: between the driver's points
-/// on cracks, model units; about the edges of the driver. The unbroken mesh's vertices keep their bonds; crack points
-/// on the surface hang where the first vertex of their edge does; points inside hang on a coarse triangulation of their
-/// crack, the same from both sides. Cost O(V). Errors: unsuitable (another code than blend; another mesh), cancelled.
+/// Breaks a model. fractured: its mesh, broken with pieces_are_cells. crack_spacing: distance between the driver's
+/// points on cracks, model units; take about the edge length of the driver. Vertices of the unbroken mesh keep their
+/// bonds. Crack points on the surface are bound like the first vertex of their edge. Crack points inside are bound to a
+/// coarse triangulation of their crack, the same from both sides. Cost O(V). Errors: unsuitable (another mesh),
+/// cancelled.
 Result<BrokenModel> break_model(const Model& model, const FracturedMesh& fractured, const FractureCells& cells,
                                 double crack_spacing, const RunContext& context);
 

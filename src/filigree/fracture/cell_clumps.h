@@ -1,7 +1,7 @@
 // Pieces of several cells. Private to the layer.
 #pragma once
 
-#include "filigree/fracture/fracture_cells.h"
+#include "filigree/fracture.h"
 
 namespace filigree {
 

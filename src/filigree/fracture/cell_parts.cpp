@@ -1,7 +1,7 @@
 #include "filigree/fracture/cell_parts.h"
 
 #include "filigree/core/disjoint_sets.h"
-#include "filigree/sample/edge_balance.h"
+#include "filigree/mesh/edges.h"
 
 #include <algorithm>
 #include <map>
@@ -238,7 +238,7 @@ std::size_t count_open_edges(const CutSurface& cut, std::span<const CellTriangle
                          owned.number(t.vertices[2], piece)});
     }
     std::size_t open = 0;
-    for_each_edge(owned.count(), named, [&](const EdgeBalance& edge) { open += edge.net != 0; });
+    for (const std::span<const Index> edge : edges_of(named, owned.count())) open += edge_balance(named, edge) != 0;
     return open;
 }
 

@@ -1,5 +1,6 @@
 #include "filigree/fracture/crack_surfaces.h"
 
+#include "filigree/core/lists.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/fracture/planar_fill.h"
 
@@ -186,19 +187,13 @@ struct FilledFacet {
 
 /// Neighbours of each local point, each once or twice.
 IndexLists neighbours_of(std::span<const Triangle> triangles, std::size_t points) {
-    IndexLists lists;
-    lists.offsets.assign(points + 1, 0);
-    for (const Triangle& t : triangles)
-        for (const Index v : t) lists.offsets[v + 1] += 2;
-    for (std::size_t v = 0; v < points; ++v) lists.offsets[v + 1] += lists.offsets[v];
-    lists.items.resize(lists.offsets.back());
-    std::vector<Index> next(lists.offsets.begin(), lists.offsets.end() - 1);
-    for (const Triangle& t : triangles)
-        for (std::size_t k = 0; k < 3; ++k) {
-            lists.items[next[t[k]]++] = t[(k + 1) % 3];
-            lists.items[next[t[k]]++] = t[(k + 2) % 3];
-        }
-    return lists;
+    return make_lists<Index>(points, [&](const auto& add) {
+        for (const Triangle& t : triangles)
+            for (std::size_t k = 0; k < 3; ++k) {
+                add(t[k], t[(k + 1) % 3]);
+                add(t[k], t[(k + 2) % 3]);
+            }
+    });
 }
 
 /// Places the points inside a rough facet: on the crack, carried along by where the outline really is, with finer

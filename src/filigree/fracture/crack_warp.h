@@ -1,22 +1,12 @@
 // The distortion of space that makes cracks rough: what is a plane on the grid is a rough surface in space.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/fracture.h"
 
 #include <array>
 #include <cstdint>
 
 namespace filigree {
-
-/// Fractal noise and a stretch. All lengths in model units, relative to the mesh's origin.
-struct CrackWarpOptions {
-    Box box;                 ///< of what is cut
-    double roughness = 0;    ///< 0: cracks are planes; 1: as rough as space may be bent without folding
-    double wavelength = 0;   ///< of the coarsest bumps; above 0 where roughness is
-    Vec3d grain = {0, 0, 1}; ///< unit vector along which pieces are longer
-    double stretch = 1;      ///< how many times longer, 1 or more
-    std::uint64_t seed = 1;
-};
 
 /// q = scale A (p + n(p) - centre), where A shrinks along the grain and n is value noise of three octaves, Hurst
 /// exponent 0.8. The steps of n are bounded such that the map has an inverse at any roughness from 0 to 1.

@@ -1,9 +1,10 @@
 #include "filigree/fracture/cut_surface.h"
 
 #include "filigree/core/disjoint_sets.h"
+#include "filigree/core/hash.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/random.h"
-#include "filigree/sample/edge_balance.h"
+#include "filigree/mesh/edges.h"
 
 #include <algorithm>
 #include <bit>
@@ -21,9 +22,7 @@ constexpr std::size_t kMostGrowth = 3, kFewestRefined = 500'000;
 
 using Name = std::array<Index, 4>;
 struct NameHash {
-    std::size_t operator()(const Name& name) const {
-        return random_bits(std::uint64_t(name[0]) << 32 | name[1], std::uint64_t(name[2]) << 32 | name[3]);
-    }
+    std::size_t operator()(const Name& name) const { return hash_words(name[0], name[1], name[2], name[3]); }
 };
 
 /// Cones over the open borders, each around the middle of a connected border.
@@ -35,10 +34,12 @@ void close_borders(CutSurface& cut, std::size_t mesh_vertices, const FractureCel
         int times;
     };
     std::vector<Open> open;
-    for_each_edge(mesh_vertices, triangles, [&](const EdgeBalance& edge) {
-        if (edge.net > 0) open.push_back({edge.high, edge.low, edge.net}); // the cone runs the other way
-        if (edge.net < 0) open.push_back({edge.low, edge.high, -edge.net});
-    });
+    for (const std::span<const Index> edge : edges_of(triangles, mesh_vertices)) {
+        const int net = edge_balance(triangles, edge);
+        const auto [low, high] = edge_ends(triangles, edge);
+        if (net > 0) open.push_back({high, low, net}); // the cone runs the other way
+        if (net < 0) open.push_back({low, high, -net});
+    }
     if (open.empty()) return;
     DisjointSets borders(mesh_vertices);
     for (const Open& edge : open) borders.join(edge.from, edge.to);

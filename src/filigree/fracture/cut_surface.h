@@ -1,20 +1,15 @@
 // A surface cut along the borders of cells.
 #pragma once
 
-#include "filigree/fracture/fracture_cells.h"
+#include "filigree/fracture.h"
+#include "filigree/fracture/crack_warp.h"
+#include "filigree/fracture/voronoi.h"
 #include "filigree/mesh/surface.h"
 
 #include <array>
 #include <unordered_map>
 
 namespace filigree {
-
-/// Where a new vertex of the surface is: weights of two or three of the mesh's vertices (kNoIndex: none), all corners
-/// of one triangle.
-struct FacePoint {
-    std::array<Index, 3> vertices = {kNoIndex, kNoIndex, kNoIndex};
-    std::array<double, 3> weights = {0, 0, 0}; ///< add up to 1
-};
 
 /// The mesh's vertices and, behind them, those that the cut adds. Vertices at one place, to the bit, are one.
 class CutVertices {

@@ -1,10 +1,10 @@
-#include "filigree/fracture/fracture.h"
+#include "filigree/fracture.h"
 
+#include "filigree/core/now_seconds.h"
 #include "filigree/fracture/piece_assembly.h"
 #include "filigree/sample/closure.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
 
@@ -14,8 +14,6 @@ namespace {
 
 constexpr double kSheetShare = 0.25; ///< of closing area beside the mesh's: above, there is no inside worth the name
 constexpr double kPlanarEdge = 1.0 / 6, kRoughEdge = 1.0 / 20; ///< of a piece's size
-
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 /// How far a piece of average volume is across.
 double piece_size(const CutSurface& cut, Index cells) {
@@ -78,10 +76,10 @@ std::optional<Mesh> turned_outwards(const Mesh& mesh, const Surface& surface, Ou
 
 Result<FracturedMesh> fracture_outward(const Mesh& mesh, const Surface& surface, const FractureCells& cells,
                                        const FractureOptions& options, CutReport report, const RunContext& context) {
-    double start = now();
+    double start = now_seconds();
     const auto lap = [&start] {
         const double before = start;
-        return (start = now()) - before;
+        return (start = now_seconds()) - before;
     };
     Result<CutSurface> cut = cut_surface(mesh, surface, cells, context);
     if (!cut) return cut.error();

@@ -1,4 +1,8 @@
-#include "filigree/fracture/fracture_cells.h"
+#include "filigree/fracture.h"
+
+#include "filigree/core/lists.h"
+#include "filigree/fracture/crack_warp.h"
+#include "filigree/fracture/voronoi.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,15 +21,39 @@ std::uint64_t packed(const GridPoint& p) {
     return bits;
 }
 
-} // namespace
-
-GridPoint FractureCells::on_grid(const Vec3d& point) const {
-    const Vec3d q = warp_.to_grid(point);
+GridPoint grid_point(const CrackWarp& warp, const Vec3d& point) {
+    const Vec3d q = warp.to_grid(point);
     GridPoint grid;
     for (int axis = 0; axis < 3; ++axis)
         grid[axis] = std::int64_t(std::llround(std::clamp(q[axis], -CrackWarp::kGridHalf, CrackWarp::kGridHalf)));
     return grid;
 }
+
+} // namespace
+
+struct FractureCells::Diagram {
+    explicit Diagram(const CrackWarpOptions& options) : warp(options) {}
+
+    CrackWarp warp;
+    GridSeeds grid;
+    std::vector<VoronoiCell> cells;
+    IndexLists neighbours;  ///< of each cell, without ghosts
+    Index first = kNoIndex; ///< a cell that is not empty
+};
+
+FractureCells::FractureCells(std::shared_ptr<const Diagram> diagram) : diagram_(std::move(diagram)) {}
+FractureCells::~FractureCells() = default;
+FractureCells::FractureCells(const FractureCells&) = default;
+FractureCells& FractureCells::operator=(const FractureCells&) = default;
+FractureCells::FractureCells(FractureCells&&) noexcept = default;
+FractureCells& FractureCells::operator=(FractureCells&&) noexcept = default;
+
+Index FractureCells::count() const { return diagram_->grid.count; }
+std::span<const Index> FractureCells::neighbours(Index cell) const { return diagram_->neighbours[cell]; }
+const CrackWarp& FractureCells::warp() const { return diagram_->warp; }
+const GridSeeds& FractureCells::grid() const { return diagram_->grid; }
+const VoronoiCell& FractureCells::cell(Index seed) const { return diagram_->cells[seed]; }
+GridPoint FractureCells::on_grid(const Vec3d& point) const { return grid_point(diagram_->warp, point); }
 
 Result<FractureCells> FractureCells::create(std::span<const Vec3d> seeds, std::span<const double> weights,
                                             const CrackWarpOptions& options, const RunContext& context) {
@@ -37,14 +65,14 @@ Result<FractureCells> FractureCells::create(std::span<const Vec3d> seeds, std::s
     for (const Vec3d& seed : seeds)
         if (!seed.allFinite()) return Error{ErrorCode::unsuitable, "A seed of the fracture is not a finite point."};
 
-    FractureCells cells{CrackWarp(options)};
-    GridSeeds& grid = cells.grid_;
+    const auto diagram = std::make_shared<Diagram>(options);
+    GridSeeds& grid = diagram->grid;
     grid.count = static_cast<Index>(seeds.size());
     std::unordered_set<std::uint64_t> taken;
     constexpr std::int64_t kHeaviest = std::int64_t(1) << 36;
     for (std::size_t k = 0; k < seeds.size(); ++k) {
-        const GridPoint p = cells.on_grid(seeds[k]);
-        const double weight = weights.empty() ? 0 : weights[k] * cells.warp_.scale() * cells.warp_.scale();
+        const GridPoint p = grid_point(diagram->warp, seeds[k]);
+        const double weight = weights.empty() ? 0 : weights[k] * diagram->warp.scale() * diagram->warp.scale();
         if (!(std::abs(weight) <= double(kHeaviest)))
             return Error{ErrorCode::unsuitable, "A seed's weight is beyond the square of the box's extent."};
         // A seed on another's point is the lightest there can be: it gets no cell.
@@ -60,17 +88,16 @@ Result<FractureCells> FractureCells::create(std::span<const Vec3d> seeds, std::s
             grid.square.push_back(kGhostDistance * kGhostDistance);
         }
 
-    Result<std::vector<VoronoiCell>> diagram = voronoi_cells(grid, context);
-    if (!diagram) return diagram.error();
-    cells.cells_ = std::move(*diagram);
-    cells.first_ = kNoIndex;
+    Result<std::vector<VoronoiCell>> cells = voronoi_cells(grid, context);
+    if (!cells) return cells.error();
+    diagram->cells = std::move(*cells);
     for (Index k = 0; k < grid.count; ++k) {
-        for (const CellFace& face : cells.cells_[k])
-            if (!grid.is_ghost(face.neighbour)) cells.neighbours_.items.push_back(face.neighbour);
-        cells.neighbours_.offsets.push_back(static_cast<Index>(cells.neighbours_.items.size()));
-        if (cells.first_ == kNoIndex && !cells.cells_[k].empty()) cells.first_ = k;
+        for (const CellFace& face : diagram->cells[k])
+            if (!grid.is_ghost(face.neighbour)) diagram->neighbours.items.push_back(face.neighbour);
+        diagram->neighbours.offsets.push_back(static_cast<Index>(diagram->neighbours.items.size()));
+        if (diagram->first == kNoIndex && !diagram->cells[k].empty()) diagram->first = k;
     }
-    return cells;
+    return FractureCells(diagram);
 }
 
 Status FractureCells::merge(std::vector<Index> piece_of_cell) {
@@ -91,13 +118,14 @@ Status FractureCells::merge(std::vector<Index> piece_of_cell) {
 }
 
 Index FractureCells::cell_at(const GridPoint& point, Index near) const {
-    Index best = near < count() && !cells_[near].empty() ? near : first_;
-    std::int64_t least = grid_.power(best, point);
+    const GridSeeds& grid = diagram_->grid;
+    Index best = near < grid.count && !diagram_->cells[near].empty() ? near : diagram_->first;
+    std::int64_t least = grid.power(best, point);
     // Greedy steps reach the cell: a cell that no neighbour beats is the one.
     for (bool moved = true; moved;) {
         moved = false;
-        for (const Index other : neighbours_[best]) {
-            const std::int64_t power = grid_.power(other, point);
+        for (const Index other : diagram_->neighbours[best]) {
+            const std::int64_t power = grid.power(other, point);
             if (power < least || (power == least && other < best)) {
                 least = power;
                 best = other;

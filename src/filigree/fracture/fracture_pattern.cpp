@@ -1,12 +1,12 @@
-#include "filigree/fracture/fracture_pattern.h"
+#include "filigree/fracture.h"
 
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/random.h"
 #include "filigree/fracture/cell_clumps.h"
+#include "filigree/fracture/crack_warp.h"
 #include "filigree/mesh/triangulate.h"
+#include "filigree/sample.h"
 #include "filigree/sample/closure.h"
-#include "filigree/sample/spacing_for_count.h"
-#include "filigree/sample/spread_inside.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 // Pieces put together as one mesh, with the attributes of the mesh they are of.
 #pragma once
 
+#include "filigree/fracture.h"
 #include "filigree/fracture/cell_parts.h"
-#include "filigree/fracture/fracture.h"
 #include "filigree/mesh/surface.h"
 
 namespace filigree {

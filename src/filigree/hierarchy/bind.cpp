@@ -5,7 +5,7 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/hierarchy/nearest_sources.h"
 #include "filigree/mesh/closest_point.h"
-#include "filigree/mesh/incidence.h"
+#include "filigree/mesh/edges.h"
 
 #include <algorithm>
 #include <optional>
@@ -13,6 +13,9 @@
 namespace filigree {
 
 namespace {
+
+/// How well a vertex could be bound; see Binding.
+enum class BondKind : std::uint8_t { good, away, gap };
 
 /// What rules a cell out quickly: its normal (any length) and a sphere around it.
 struct CellShape {
@@ -101,16 +104,14 @@ std::vector<Index> nearest_driver_vertices(std::span<const Vec3f> positions, std
 }
 
 /// Bonds of the representatives by a walk from the driver vertex near them, or from the cell of the vertex they were
-/// removed beside. What faces where says nothing about loose parts: they lie on a side, and belong to none.
-/// corners: what cells are over.
-void walk_to_bonds(std::span<const Vec3f> corners, std::span<const Triangle> cells, std::span<const Vec3f> positions,
-                   std::span<const Vec3f> normals, std::span<const Index> representative, const NearestDriver& nearest,
-                   const RemovedVertices& removed, std::span<Bond> bonds, std::span<BondKind> kinds,
-                   const RunContext& context) {
-    const IndexLists around = triangles_at_vertices(cells, corners.size());
+/// removed beside. The normals of loose parts do not count: such a part lies on one side of the surface.
+void walk_to_bonds(std::span<const Vec3f> positions, std::span<const Triangle> cells, std::span<const Vec3f> normals,
+                   std::span<const Index> representative, const NearestDriver& nearest, const RemovedVertices& removed,
+                   std::span<Bond> bonds, std::span<BondKind> kinds, const RunContext& context) {
+    const IndexLists around = triangles_at_vertices(cells, positions.size());
     std::vector<CellShape> shapes;
     for (const Triangle& cell : cells)
-        shapes.push_back(cell_shape(corners[cell[0]], corners[cell[1]], corners[cell[2]]));
+        shapes.push_back(cell_shape(positions[cell[0]], positions[cell[1]], positions[cell[2]]));
     const auto start_of = [&](Index v) -> std::span<const Index> {
         const Index beside = removed.empty() ? kNoIndex : removed.nearest_left[v];
         if (beside != kNoIndex && bonds[beside].cell != kNoIndex) return cells[bonds[beside].cell];
@@ -120,7 +121,7 @@ void walk_to_bonds(std::span<const Vec3f> corners, std::span<const Triangle> cel
     const auto walk_round = [&](std::uint8_t round) {
         parallel_for(context, positions.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
             if (context.is_cancelled()) return;
-            Walk walk(corners, cells, around, shapes);
+            Walk walk(positions, cells, around, shapes);
             for (std::size_t v = begin; v < end; ++v) {
                 if (representative[v] != v) continue;
                 if (!removed.empty() && removed.removed[v] != round) continue;
@@ -140,14 +141,14 @@ void walk_to_bonds(std::span<const Vec3f> corners, std::span<const Triangle> cel
 }
 
 /// Bonds of what nothing is near, as in a mesh without triangles: the closest cell.
-void bind_to_closest(std::span<const Vec3f> corners, std::span<const Triangle> cells, std::span<const Vec3f> positions,
+void bind_to_closest(std::span<const Vec3f> positions, std::span<const Triangle> cells,
                      std::span<const Index> representative, std::span<Bond> bonds, const RunContext& context) {
     const auto is_unbound = [&](Index v) { return representative[v] == v && bonds[v].cell == kNoIndex; };
     Index first = 0;
     while (first < positions.size() && !is_unbound(first)) ++first;
     if (first == positions.size()) return;
     std::optional<ClosestPointTree> tree; // Embree builds on the threads of the arena it is called in
-    context.execute([&] { tree.emplace(corners, cells); });
+    context.execute([&] { tree.emplace(positions, cells); });
     parallel_for(context, positions.size(), 1 << 12, [&](std::size_t begin, std::size_t end) {
         if (context.is_cancelled()) return;
         for (Index v = Index(begin); v < end; ++v)
@@ -179,35 +180,20 @@ Result<Binding> bind_to_driver(std::span<const Vec3f> positions, const Surface& 
                                std::span<const Triangle> cells, const NearestDriver& nearest,
                                const RemovedVertices& removed, const RunContext& context) {
     if (std::optional<Error> error = check_size(surface, cells)) return *error;
-    PlaceBonds bound =
-        bind_places(positions, cells, positions, normals, surface.representative, nearest, removed, context);
+    Binding binding{.bonds = std::vector<Bond>(positions.size()), .across_gap = {}, .facing_away = {}};
+    std::vector<BondKind> kinds(positions.size(), BondKind::good);
+    const std::span<const Index> representative = surface.representative;
+    walk_to_bonds(positions, cells, normals, representative, nearest, removed, binding.bonds, kinds, context);
     if (context.is_cancelled()) return cancelled_error();
-    Binding binding = binding_of(std::move(bound), surface.representative);
-    context.report("bind", 1);
-    return binding;
-}
-
-PlaceBonds bind_places(std::span<const Vec3f> corners, std::span<const Triangle> cells,
-                       std::span<const Vec3f> positions, std::span<const Vec3f> normals,
-                       std::span<const Index> representative, const NearestDriver& nearest,
-                       const RemovedVertices& removed, const RunContext& context) {
-    PlaceBonds bound{.bonds = std::vector<Bond>(positions.size()),
-                     .kinds = std::vector<BondKind>(positions.size(), BondKind::good)};
-    walk_to_bonds(corners, cells, positions, normals, representative, nearest, removed, bound.bonds, bound.kinds,
-                  context);
-    if (context.is_cancelled()) return bound;
-    bind_to_closest(corners, cells, positions, representative, bound.bonds, context);
-    return bound;
-}
-
-Binding binding_of(PlaceBonds bound, std::span<const Index> representative) {
-    Binding binding{.bonds = std::move(bound.bonds), .across_gap = {}, .facing_away = {}};
+    bind_to_closest(positions, cells, representative, binding.bonds, context);
+    if (context.is_cancelled()) return cancelled_error();
     for (Index v = 0; v < representative.size(); ++v) {
         const Index r = representative[v];
         binding.bonds[v] = binding.bonds[r];
-        if (bound.kinds[r] == BondKind::gap) binding.across_gap.push_back(v);
-        if (bound.kinds[r] == BondKind::away) binding.facing_away.push_back(v);
+        if (kinds[r] == BondKind::gap) binding.across_gap.push_back(v);
+        if (kinds[r] == BondKind::away) binding.facing_away.push_back(v);
     }
+    context.report("bind", 1);
     return binding;
 }
 

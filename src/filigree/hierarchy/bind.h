@@ -48,23 +48,4 @@ Result<Binding> bind_to_driver(std::span<const Vec3f> positions, const Surface& 
                                std::span<const Triangle> cells, const NearestDriver& nearest,
                                const RemovedVertices& removed, const RunContext& context);
 
-/// How well a vertex could be bound; see Binding.
-enum class BondKind : std::uint8_t { good, away, gap };
-
-struct PlaceBonds {
-    std::vector<Bond> bonds;
-    std::vector<BondKind> kinds;
-};
-
-/// The bonds of representatives, as above; the other vertices have none yet. corners: positions of the cells' own
-/// vertices; nearest: some of those. A vertex that nothing is near is bound to the closest cell. Cancelled: half of it.
-/// So some vertices can be bound without the others, if those that they hang near are among them.
-PlaceBonds bind_places(std::span<const Vec3f> corners, std::span<const Triangle> cells,
-                       std::span<const Vec3f> positions, std::span<const Vec3f> normals,
-                       std::span<const Index> representative, const NearestDriver& nearest,
-                       const RemovedVertices& removed, const RunContext& context);
-
-/// All vertices bound as their representatives are. Cost O(V).
-Binding binding_of(PlaceBonds bound, std::span<const Index> representative);
-
 } // namespace filigree

@@ -1,10 +1,11 @@
 #include "filigree/hierarchy/cluster_simplify.h"
 
 #include "filigree/core/disjoint_sets.h"
+#include "filigree/core/hash.h"
 #include "filigree/core/parallel_for.h"
-#include "filigree/hierarchy/morton_order.h"
 #include "filigree/hierarchy/nearest_sources.h"
 #include "filigree/hierarchy/roughen.h"
+#include "filigree/mesh/morton.h"
 
 #include <algorithm>
 #include <array>
@@ -35,7 +36,7 @@ public:
         for (std::uint32_t axis = 0; axis < 3; ++axis) {
             const std::uint32_t shift = kShift[(round + 2 * axis * (round > 0)) % kShift.size()];
             for (std::uint32_t k = 0; k < kLattice; ++k)
-                spread_[axis][k] = MortonOrder::spread((k + shift) % kLattice) << axis;
+                spread_[axis][k] = static_cast<std::uint32_t>(spread_bits((k + shift) % kLattice) << axis);
         }
     }
 
@@ -121,7 +122,7 @@ public:
         table_.assign(size, kNoIndex);
     }
     Index local(Index vertex) {
-        std::size_t slot = std::size_t(vertex * std::uint64_t{0x9E3779B97F4A7C15} >> 20) & (table_.size() - 1);
+        std::size_t slot = hash_words(vertex) & (table_.size() - 1);
         for (;; slot = (slot + 1) & (table_.size() - 1)) {
             if (table_[slot] == kNoIndex) {
                 table_[slot] = static_cast<Index>(global.size());

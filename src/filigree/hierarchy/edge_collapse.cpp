@@ -16,13 +16,13 @@
 #include "filigree/hierarchy/edge_collapse.h"
 
 #include "filigree/mesh/closest_point.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/mesh/quadric.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <queue>
-#include <unordered_map>
 #include <utility>
 
 namespace filigree {
@@ -139,8 +139,9 @@ private:
 
     void make_quadrics() {
         quadrics_.resize(points_.size());
-        std::unordered_map<std::uint64_t, int> edges; // how many triangles each has
-        edges.reserve(triangles_.size() * 2);
+        std::vector<bool> is_open(3 * triangles_.size(), true); // half-edges of edges that have not two triangles
+        for (const std::span<const Index> edge : edges_of(triangles_, points_.size()))
+            for (const Index h : edge) is_open[h] = edge.size() != 2;
         for (Index t = 0; t < triangles_.size(); ++t) {
             const Vec3d n = normal(triangles_[t]);
             const double area = 0.5 * n.norm();
@@ -148,13 +149,12 @@ private:
                 Quadric& quadric = quadrics_[triangles_[t][k]];
                 if (area > 0) quadric.add_plane(n.normalized(), points_[triangles_[t][k]], area / 3);
                 quadric.area += area / 3;
-                ++edges[edge_key(triangles_[t][k], triangles_[t][(k + 1) % 3])];
             }
         }
         for (Index t = 0; t < triangles_.size(); ++t)
             for (int k = 0; k < 3; ++k) {
+                if (!is_open[3 * t + Index(k)]) continue;
                 const Index a = triangles_[t][k], b = triangles_[t][(k + 1) % 3];
-                if (edges[edge_key(a, b)] == 2) continue;
                 const Vec3d along = points_[b] - points_[a];
                 const Vec3d side = along.cross(normal(triangles_[t]));
                 if (side.squaredNorm() == 0) continue;
@@ -162,8 +162,6 @@ private:
                     quadrics_[v].add_plane(side.normalized(), points_[a], kBorderWeight * along.squaredNorm() / 2);
             }
     }
-
-    static std::uint64_t edge_key(Index a, Index b) { return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b); }
 
     std::vector<Index> neighbours_of(Index v) const {
         std::vector<Index> neighbours;

@@ -16,16 +16,16 @@ namespace {
 constexpr double kQuadratics = 10; // how cheap quadratic terms are beside the kernel; between 1 and 100 little changes
 constexpr double kRidge =
     3e-8; // on the kernel, in units of the set's size: keeps vertices almost at one place solvable
-constexpr double kFlat = 6e-4, kSolid = 6e-3; // thickness in widths: below the first the law, above the second the sum
-constexpr double kNoSpread = 1e-4;            // thickness in widths below which a direction has no linear term
-constexpr double kGhostLength = 0.1;          // of a ghost point from its vertex, in mean edge lengths
+constexpr double kFlat = 6e-4,
+                 kSolid = 6e-3;    // thickness in widths: below the first completed, above the second the sum
+constexpr double kNoSpread = 1e-4; // thickness in widths below which a direction has no linear term
 
-/// a with what it does to the unit vector n replaced by s n', n' and s from what it does to the plane across n.
-Mat3d with_law(const Mat3d& a, const Vec3d& n, HeightLaw law) {
+/// a with what it does to the unit vector n replaced by s n': n' and s from what a does to the plane across n.
+Mat3d with_normal_column(const Mat3d& a, const Vec3d& n) {
     const Vec3d t = n.unitOrthogonal();
     const Vec3d across = (a * t).cross(a * n.cross(t)); // the deformed normal; its length is the area ratio
     const double area = across.norm();
-    const Vec3d column = area > 0 ? Vec3d(height_law_scale(law, 1, area) * across / area) : Vec3d(Vec3d::Zero());
+    const Vec3d column = area > 0 ? Vec3d(std::sqrt(area) * across / area) : Vec3d(Vec3d::Zero());
     return a + (column - a * n) * n.transpose();
 }
 
@@ -51,21 +51,6 @@ Mat3d turned_with_line(const Mat3d& a, const Vec3d& t) {
     if (!(stretch > 0)) return moved * t.transpose();
     const Mat3d turn = least_rotation(t.normalized(), moved / stretch);
     return moved * t.transpose() + stretch * turn * (Mat3d::Identity() - t * t.transpose());
-}
-
-/// The mean length of the edges at each vertex, each counted once for each face it is of.
-std::vector<double> mean_edge_lengths(const Mesh& mesh) {
-    std::vector<double> sums(mesh.vertex_count(), 0), edges(mesh.vertex_count(), 0);
-    for (std::size_t f = 0; f < mesh.face_count(); ++f) {
-        const std::span<const Index> face = mesh.face(f);
-        for (std::size_t k = 0; k < face.size(); ++k) {
-            const Index ends[] = {face[k], face[(k + 1) % face.size()]};
-            const double length = (mesh.positions[ends[0]] - mesh.positions[ends[1]]).cast<double>().norm();
-            for (Index v : ends) sums[v] += length, ++edges[v];
-        }
-    }
-    for (std::size_t v = 0; v < sums.size(); ++v) sums[v] /= std::max(edges[v], 1.0);
-    return sums;
 }
 
 /// A set of points in axes of its own: along which it spreads most first, about the vertex, in units of its size.
@@ -120,14 +105,10 @@ Eigen::MatrixXd gradient_weights(const LocalSet& set) {
 
 } // namespace
 
-GradientFit::GradientFit(const Mesh& driver, NormalColumn normal_column, const RunContext& context)
-    : rest_(driver.positions), normals_(vertex_normals(driver, driver.positions, context)),
-      normal_column_(normal_column) {
-    const IndexLists neighbours = space_neighbours(
-        driver, normals_, normal_column == NormalColumn::shell ? NeighbourKind::along_surface : NeighbourKind::in_space,
-        context);
+GradientFit::GradientFit(const Mesh& driver, const RunContext& context) : rest_(driver.positions) {
+    const IndexLists neighbours =
+        space_neighbours(driver, vertex_normals(driver, driver.positions, context), NeighbourKind::in_space, context);
     const std::size_t count = rest_.size();
-    for (double length : mean_edge_lengths(driver)) ghost_lengths_.push_back(float(kGhostLength * length));
     term_offsets_ = neighbours.offsets;
     terms_.assign(neighbours.items.size(), {});
     flatness_.assign(count, {});
@@ -148,11 +129,11 @@ void GradientFit::solve(Index vertex, const IndexLists& neighbours) {
         terms_[term_offsets_[vertex] + k] = {neighbours[vertex][k], weight};
     }
     const int rank = set.rank();
-    const auto share_of_law = [&](int axis) {
+    const auto completed_share = [&](int axis) {
         return rank < axis + 1 ? 1 : float(1 - smoothstep(kFlat, kSolid, set.spread[axis] / set.spread[axis - 1]));
     };
-    flatness_[vertex] = {set.axes.col(0).cast<float>(), set.axes.col(2).cast<float>(), share_of_law(1),
-                         share_of_law(2)};
+    flatness_[vertex] = {set.axes.col(0).cast<float>(), set.axes.col(2).cast<float>(), completed_share(1),
+                         completed_share(2)};
     rest_error_[vertex] = (set.axes.leftCols(rank) * set.axes.leftCols(rank).transpose()).cast<float>();
 }
 
@@ -170,54 +151,19 @@ std::vector<Mat3f> GradientFit::sum(std::span<const Vec3f> positions, const RunC
     return gradients;
 }
 
-Mat3f GradientFit::complete(const Mat3f& gradient, const Flatness& flatness, HeightLaw law) const {
+Mat3f GradientFit::complete(const Mat3f& gradient, const Flatness& flatness) {
     if (flatness.off_plane == 0) return gradient;
     Mat3d a = gradient.cast<double>();
     if (flatness.beside_line > 0) a += flatness.beside_line * (turned_with_line(a, flatness.line.cast<double>()) - a);
-    a += flatness.off_plane * (with_law(a, flatness.normal.cast<double>(), law) - a);
+    a += flatness.off_plane * (with_normal_column(a, flatness.normal.cast<double>()) - a);
     return a.cast<float>();
 }
 
-std::vector<Mat3f> GradientFit::fit_space(std::span<const Vec3f> positions, HeightLaw law,
-                                          const RunContext& context) const {
+std::vector<Mat3f> GradientFit::fit(std::span<const Vec3f> positions, const RunContext& context) const {
     std::vector<Mat3f> gradients = sum(positions, context);
     for (std::size_t i = 0; i < gradients.size(); ++i)
-        gradients[i] = complete(gradients[i] + rest_error_[i], flatness_[i], law);
+        gradients[i] = complete(gradients[i] + rest_error_[i], flatness_[i]);
     return gradients;
-}
-
-std::vector<Mat3f> GradientFit::fit(std::span<const Vec3f> positions, HeightLaw law, const RunContext& context) const {
-    std::vector<Mat3f> gradients = fit_space(positions, law, context);
-    if (normal_column_ == NormalColumn::shell) make_shell(gradients, law);
-    return gradients;
-}
-
-std::vector<Mat3f> GradientFit::fit_to_ghosts(std::span<const Vec3f> positions, std::span<const Vec3f> ghosts,
-                                              const RunContext& context) const {
-    const std::vector<Vec3f> rest = rest_ghosts();
-    std::vector<Mat3f> gradients = fit_space(positions, HeightLaw::proportional, context);
-    for (std::size_t i = 0; i < gradients.size(); ++i) {
-        const Vec3d normal = normals_[i].cast<double>().normalized();
-        const double length = (rest[i] - rest_[i]).cast<double>().norm(); // as rounded
-        if (!(length > 0)) continue;
-        const Vec3d column = (ghosts[i] - positions[i]).cast<double>() / length;
-        const Mat3d a = gradients[i].cast<double>();
-        gradients[i] = (a + (column - a * normal) * normal.transpose()).cast<float>();
-    }
-    return gradients;
-}
-
-void GradientFit::make_shell(std::span<Mat3f> gradients, HeightLaw law) const {
-    for (std::size_t i = 0; i < gradients.size(); ++i) {
-        const Vec3d normal = normals_[i].cast<double>().normalized();
-        if (!normal.isZero(0)) gradients[i] = with_law(gradients[i].cast<double>(), normal, law).cast<float>();
-    }
-}
-
-std::vector<Vec3f> GradientFit::rest_ghosts() const {
-    std::vector<Vec3f> ghosts = rest_;
-    for (std::size_t i = 0; i < ghosts.size(); ++i) ghosts[i] += ghost_lengths_[i] * normals_[i];
-    return ghosts;
 }
 
 } // namespace filigree

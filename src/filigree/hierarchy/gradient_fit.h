@@ -1,44 +1,28 @@
-// Gradients of a driver from its positions alone, or from positions and one ghost point a vertex.
+// Gradients of a driver from its positions alone.
 #pragma once
 
 #include "filigree/core/run_context.h"
-#include "filigree/hierarchy/height_law.h"
-#include "filigree/mesh/incidence.h"
+#include "filigree/mesh/edges.h"
 
 namespace filigree {
-
-/// How the gradient's normal column is found when only positions are known.
-enum class NormalColumn {
-    fitted, ///< from the vertices around in space: solid matter, bumps stretch with the body
-    shell,  ///< s n' exactly: bumps keep their shape, for cloth and skin
-};
 
 /// The gradient at each driver vertex of the smoothest deformation that takes the vertices around it to where they are
 /// now: of the triharmonic interpolant (kernel r^3, affine part free, quadratic part nearly so; Duchon 1977) of its
 /// neighbours in space (space_neighbours.h). The interpolant is linear in the positions, so each gradient is a sum of
 /// (c_j' - c_i') g_ij^T with weights g_ij that are solved for once. Exact at rest and for affine maps.
 ///
-/// Where the neighbours lie in one plane, nothing says what happens off it: the normal column is s n' with s by the
-/// law. Sets up to six thousandths as thick as wide go over into that gradually. Where they lie on one line,
-/// the other two columns turn with it. A vertex without neighbours has the identity. With NormalColumn::shell the
-/// normal column at every vertex with a face is s n', whatever lies around.
+/// Where the neighbours lie in one plane, nothing says what happens off it: the normal column is s n', n' the deformed
+/// normal and s the square root of the plane's area ratio. Sets up to six thousandths as thick as wide go over into
+/// that gradually. Where they lie on one line, the other two columns turn with it. A vertex without neighbours has the
+/// identity.
 class GradientFit {
 public:
     /// driver: the driver at rest, not checked. Cost O(V) solves of 36 unknowns, and O(V log V) for the neighbours.
-    GradientFit(const Mesh& driver, NormalColumn normal_column, const RunContext& context);
+    GradientFit(const Mesh& driver, const RunContext& context);
 
     /// One gradient a vertex of the driver, whose vertices are now at `positions`. Cost O(V); same bytes for any thread
     /// count.
-    std::vector<Mat3f> fit(std::span<const Vec3f> positions, HeightLaw law, const RunContext& context) const;
-    /// The same with the normal column given: ghosts[i] is where rest_ghosts()[i] went.
-    std::vector<Mat3f> fit_to_ghosts(std::span<const Vec3f> positions, std::span<const Vec3f> ghosts,
-                                     const RunContext& context) const;
-    /// Replaces the normal column of given gradients by s n', n' and s from the gradients themselves.
-    void make_shell(std::span<Mat3f> gradients, HeightLaw law) const;
-
-    /// The points off the surface, a tenth of the mean edge along each vertex's normal (at the vertex where it has
-    /// none).
-    std::vector<Vec3f> rest_ghosts() const;
+    std::vector<Mat3f> fit(std::span<const Vec3f> positions, const RunContext& context) const;
 
 private:
     /// One term of a vertex's sum.
@@ -46,19 +30,16 @@ private:
         Index vertex;
         Vec3d weight;
     };
-    /// Directions in which a vertex's neighbours do not spread, and how far the law decides there, 0 to 1.
+    /// Directions in which a vertex's neighbours do not spread, and the share of what is completed there, 0 to 1.
     struct Flatness {
         Vec3f line, normal; ///< along which they spread most, and least
         float beside_line = 0, off_plane = 0;
     };
     void solve(Index vertex, const IndexLists& neighbours);
-    Mat3f complete(const Mat3f& gradient, const Flatness& flatness, HeightLaw law) const;
+    static Mat3f complete(const Mat3f& gradient, const Flatness& flatness);
     std::vector<Mat3f> sum(std::span<const Vec3f> positions, const RunContext& context) const;
-    std::vector<Mat3f> fit_space(std::span<const Vec3f> positions, HeightLaw law, const RunContext& context) const;
 
-    std::vector<Vec3f> rest_, normals_;
-    std::vector<float> ghost_lengths_; ///< from each vertex to its ghost point
-    NormalColumn normal_column_;
+    std::vector<Vec3f> rest_;
     std::vector<Index> term_offsets_;
     std::vector<Term> terms_;
     std::vector<Flatness> flatness_;

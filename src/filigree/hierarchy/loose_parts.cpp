@@ -2,7 +2,7 @@
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/closest_point.h"
-#include "filigree/mesh/incidence.h"
+#include "filigree/mesh/edges.h"
 
 #include <algorithm>
 #include <optional>

@@ -21,8 +21,10 @@ Mesh first_vertices(Mesh mesh, std::size_t count) {
 
 Mesh level_mesh(const Model& model, unsigned level) {
     if (level >= model.finest_level()) return first_vertices(model.mesh, model.vertex_count());
-    const Mesh& full = model.mesh;
-    const Level& source = model.levels[level];
+    return level_mesh(model.mesh, model.levels[level]);
+}
+
+Mesh level_mesh(const Mesh& full, const Level& source) {
     Mesh mesh;
     mesh.origin = full.origin;
     mesh.face_offsets = source.face_offsets;
@@ -70,7 +72,7 @@ std::vector<Vec3f> driver_positions(const Model& model) {
     return positions;
 }
 
-Pose rest_pose(const Model& model) { return {driver_positions(model), {}, {}}; }
+Pose rest_pose(const Model& model) { return {driver_positions(model), {}}; }
 
 namespace {
 
@@ -79,6 +81,8 @@ bool ascending_below(std::span<const Index> ids, std::size_t limit) {
         if (ids[i] >= limit || (i > 0 && ids[i] <= ids[i - 1])) return false;
     return true;
 }
+
+} // namespace
 
 std::string check_level(const Level& level, std::size_t vertex_count) {
     if (level.vertices.empty()) return "a level has no vertices";
@@ -89,6 +93,8 @@ std::string check_level(const Level& level, std::size_t vertex_count) {
     mesh.corners = level.corners;
     return check_mesh(mesh);
 }
+
+namespace {
 
 /// What the gradient fit's cost is bounded by: it pairs the corners of each face.
 bool all_triangles(const Level& level) {
@@ -160,15 +166,8 @@ std::string check_model(const Model& model) {
         if (std::string wrong = check_level(level, model.mesh.vertex_count()); !wrong.empty()) return wrong;
     if (model.driver_is_behind)
         if (std::string wrong = check_driver_behind(model); !wrong.empty()) return wrong;
-    if (const auto* blend = std::get_if<BlendDetail>(&model.detail)) {
-        if (!all_triangles(model.driver())) return "the driver of a blend model has faces that are not triangles";
-        return check_blend(*blend, model.mesh.vertex_count(), model.driver().vertices.size());
-    }
-    const auto& reference = std::get<ReferenceDetail>(model.detail);
-    if (reference.patches.levels != model.levels.size() ||
-        reference.rest_driver.size() != model.driver().vertices.size())
-        return "levels and patches differ";
-    return check_reference(reference, model.mesh.vertex_count());
+    if (!all_triangles(model.driver())) return "the driver has faces that are not triangles";
+    return check_blend(model.detail, model.mesh.vertex_count(), model.driver().vertices.size());
 }
 
 } // namespace filigree

@@ -3,16 +3,12 @@
 
 #include "filigree/hierarchy/blend_code.h"
 #include "filigree/hierarchy/pose.h"
-#include "filigree/hierarchy/reference_code.h"
 #include "filigree/mesh/mesh.h"
 
 #include <span>
 #include <string>
-#include <variant>
 
 namespace filigree {
-
-enum class DetailCode { reference, blend };
 
 /// One resolution of a mesh.
 struct Level {
@@ -27,14 +23,13 @@ struct Level {
 struct Model {
     Mesh mesh;                 ///< the finest level, as it came in; see driver_is_behind
     std::vector<Level> levels; ///< coarse to fine, without the finest; levels[0] is the driver
-    std::variant<ReferenceDetail, BlendDetail> detail;
+    BlendDetail detail;
     /// Vertex i of the mesh was vertex source_order[i] of the mesh that was stripped; empty: the order is the same.
     std::vector<Index> source_order = {};
     /// The driver was made elsewhere (strip_to_driver): its vertices are the last ones of `mesh`, where no face has
     /// them. No level has them but the driver, so what is restored and written has the mesh's own vertices alone.
     bool driver_is_behind = false;
 
-    DetailCode code() const { return static_cast<DetailCode>(detail.index()); }
     /// The number of the finest level; levels 0 .. finest_level() exist.
     unsigned finest_level() const { return static_cast<unsigned>(levels.size()); }
     const Level& driver() const { return levels.front(); }
@@ -48,6 +43,9 @@ struct Model {
 /// vertices come along, attributes of corners and faces only at the finest level (the caller can see which are empty).
 /// Cost O(size of the mesh).
 Mesh level_mesh(const Model& model, unsigned level);
+
+/// A level below the finest as a mesh; mesh: the finest.
+Mesh level_mesh(const Mesh& mesh, const Level& level);
 
 /// What a level has, as its level_mesh() would.
 struct LevelCounts {
@@ -63,8 +61,11 @@ std::vector<float> vertex_levels(const Model& model, unsigned level);
 
 /// The driver's rest positions, in the driver's order.
 std::vector<Vec3f> driver_positions(const Model& model);
-/// The pose in which nothing has moved: the driver's rest positions, without gradients or ghost points.
+/// The pose in which nothing has moved: the driver's rest positions, without gradients.
 Pose rest_pose(const Model& model);
+
+/// The first thing wrong with a level of a mesh of so many vertices, as a sentence, or "". Cost O(size).
+std::string check_level(const Level& level, std::size_t vertex_count);
 
 /// The first thing wrong with a model, as a sentence, or "" when everything refers to what is there: indices in range,
 /// offsets ascending, records one a vertex, numbers finite. A model that passes can be restored. Cost O(size).

@@ -1,7 +1,7 @@
 // Which of some vertices is nearest to each, along the surface.
 #pragma once
 
-#include "filigree/mesh/incidence.h"
+#include "filigree/mesh/edges.h"
 
 namespace filigree {
 

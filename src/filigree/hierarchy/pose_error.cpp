@@ -78,7 +78,7 @@ private:
         if (!(diagonal > 0)) return 1;
         const RunContext context(threads);
         std::optional<GradientFit> fit;
-        if (!has_gradients) fit.emplace(driver, NormalColumn::fitted, context);
+        if (!has_gradients) fit.emplace(driver, context);
         double logarithms = 0, count = 0;
         for (std::uint64_t number = 1; number <= kWaves; ++number) {
             const Wave wave(number, diagonal, has_gradients ? kLinearAmplitude : kAmplitude);
@@ -87,7 +87,7 @@ private:
             for (const Vec3f& p : driver.positions) moved.push_back(wave.position(p));
             for (const Vec3f& p : restorer.rest()) truth.push_back(wave.position(p));
             if (fit)
-                gradients = fit->fit(moved, HeightLaw::proportional, context);
+                gradients = fit->fit(moved, context);
             else
                 for (const Vec3f& p : driver.positions) gradients.push_back(wave.gradient(p));
             const double true_error = restorer.rms_distance(moved, gradients, truth, context);
@@ -105,18 +105,17 @@ PoseError& PoseError::operator=(PoseError&&) noexcept = default;
 PoseError::~PoseError() = default;
 
 PoseError::PoseError(const Model& model, const RunContext& context) : rest_(driver_positions(model)) {
-    const auto* detail = std::get_if<BlendDetail>(&model.detail);
-    if (!detail) return;
+    const BlendDetail& detail = model.detail;
     calibration_ = std::make_unique<Calibration>(model, context);
-    cells_ = detail->cells;
+    cells_ = detail.cells;
     for (std::size_t c = 0; c < cells_.size(); ++c) {
         Load load{};
-        for (Index r = detail->cell_offsets[c]; r < detail->cell_offsets[c + 1]; ++r) {
-            const double u = double(detail->u[r]), v = double(detail->v[r]);
+        for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
+            const double u = double(detail.u[r]), v = double(detail.v[r]);
             const double b[] = {1 - u - v, u, v};
             Vec3d foot = Vec3d::Zero();
             for (int k = 0; k < 3; ++k) foot += b[k] * rest_[cells_[c][k]].cast<double>();
-            const double height = (model.mesh.positions[detail->order[r]].cast<double>() - foot).squaredNorm();
+            const double height = (model.mesh.positions[detail.order[r]].cast<double>() - foot).squaredNorm();
             for (int k = 0; k < 3; ++k) {
                 const double between = 4 * b[k] * b[(k + 1) % 3];
                 load.vertices[k] += between * between;
@@ -130,11 +129,10 @@ PoseError::PoseError(const Model& model, const RunContext& context) : rest_(driv
 
 Result<PoseError::Estimate> PoseError::estimate(const Pose& pose, std::span<const Mat3f> gradients) const {
     if (Status fits = check_pose(rest_.size(), pose); !fits) return fits.error();
-    if (calibration_ && gradients.size() != rest_.size())
+    if (gradients.size() != rest_.size())
         return Error{ErrorCode::mismatch, "There are " + std::to_string(gradients.size()) + " gradients for " +
                                               std::to_string(rest_.size()) + " driver vertices."};
     Estimate result = estimate_unscaled(pose.positions, gradients);
-    if (!calibration_) return result;
     const double factor = calibration_->factor(*this, !pose.gradients.empty());
     result.rms *= factor;
     for (float& error : result.local) error = float(double(error) * factor);
@@ -172,14 +170,13 @@ PoseError::Estimate PoseError::estimate_unscaled(std::span<const Vec3f> position
 }
 
 std::vector<float> vertex_errors(const Model& model, std::span<const float> local) {
-    const auto* detail = std::get_if<BlendDetail>(&model.detail);
-    if (!detail) return {};
+    const BlendDetail& detail = model.detail;
     std::vector<float> errors(model.mesh.vertex_count());
-    for (std::size_t c = 0; c < detail->cells.size(); ++c) {
-        const auto& [i, j, k] = detail->cells[c];
-        for (Index r = detail->cell_offsets[c]; r < detail->cell_offsets[c + 1]; ++r) {
-            const float u = detail->u[r], v = detail->v[r];
-            errors[detail->order[r]] = (1 - u - v) * local[i] + u * local[j] + v * local[k];
+    for (std::size_t c = 0; c < detail.cells.size(); ++c) {
+        const auto& [i, j, k] = detail.cells[c];
+        for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
+            const float u = detail.u[r], v = detail.v[r];
+            errors[detail.order[r]] = (1 - u - v) * local[i] + u * local[j] + v * local[k];
         }
     }
     errors.resize(model.vertex_count());

@@ -16,7 +16,7 @@ namespace filigree {
 /// would have moved the whole mesh differently.
 class PoseError {
 public:
-    /// Of a blend model; for others every estimate is 0. Does not refer to the model later on. context: what is
+    /// Does not refer to the model later on. context: what is
     /// measured later takes its threads, and cannot be cancelled; same bytes for any number. Cost O(V).
     explicit PoseError(const Model& model, const RunContext& context = RunContext());
     PoseError(PoseError&&) noexcept;
@@ -36,7 +36,7 @@ public:
     /// gradients: those that the pose is restored with (Restorer::gradients), one a driver vertex. Cost O(driver); the
     /// first pose that comes with gradients costs a few restores of 16,384 vertices too, and the first one without also
     /// a GradientFit. From many threads at a time. Errors: as of check_pose; mismatch (another number of
-    /// gradients, blend code).
+    /// gradients).
     Result<Estimate> estimate(const Pose& pose, std::span<const Mat3f> gradients) const;
 
 private:
@@ -52,11 +52,11 @@ private:
     std::vector<Vec3f> rest_;
     std::vector<Triangle> cells_;
     std::vector<Load> loads_;
-    std::unique_ptr<Calibration> calibration_; ///< null: not a blend model
+    std::unique_ptr<Calibration> calibration_;
 };
 
-/// The local estimates at the vertices of the finest mesh, for colours: blended over each cell as positions are. Empty
-/// for other than blend models. Cost O(V).
+/// The local estimates at the vertices of the finest mesh, for colours: blended over each cell as positions are. Cost
+/// O(V).
 std::vector<float> vertex_errors(const Model& model, std::span<const float> local);
 
 } // namespace filigree

@@ -8,24 +8,17 @@ namespace filigree {
 
 struct Restorer::Content {
     const Model* model = nullptr;
-    RestoreOptions options;
-    unsigned level = 0;
-    HeightLaw law = HeightLaw::proportional;
     Mesh rest;                           ///< the level at rest, with split normals
     std::vector<Index> vertices;         ///< ids in the finest mesh; empty at the finest level
     std::vector<Index> vertex_of_normal; ///< of rest.normals.values, in the level's own ids
 
-    // blend code
     mutable std::once_flag gradient_fit_made;
     mutable std::optional<GradientFit> gradient_fit; ///< made for the first pose without gradients
     std::optional<BlendRestorer> blend;              ///< positions, and normals where there is one a vertex
     std::optional<BlendRestorer> blend_normals;      ///< normals alone, where corners have their own
 
-    // reference code
-    std::optional<ReferenceRestorer> reference;
-
     bool has_vertex_normals() const { return !rest.normals.empty() && rest.normals.per_vertex(); }
-    Status prepare_blend(const RunContext& context);
+    Status prepare(const RunContext& context);
     const GradientFit& fit(unsigned threads) const;
     std::vector<Mat3f> gradients(const Pose& pose, const RunContext& context) const;
 };
@@ -41,15 +34,12 @@ std::vector<Vec3f> unit(std::vector<Vec3f> normals) {
 
 /// Not for a pose's own context: cancelled half way, it would stay half made.
 const GradientFit& Restorer::Content::fit(unsigned threads) const {
-    std::call_once(gradient_fit_made, [&] {
-        gradient_fit.emplace(level_mesh(*model, 0), options.thin_shell ? NormalColumn::shell : NormalColumn::fitted,
-                             RunContext(threads));
-    });
+    std::call_once(gradient_fit_made, [&] { gradient_fit.emplace(level_mesh(*model, 0), RunContext(threads)); });
     return *gradient_fit;
 }
 
-Status Restorer::Content::prepare_blend(const RunContext& context) {
-    const BlendDetail& detail = std::get<BlendDetail>(model->detail);
+Status Restorer::Content::prepare(const RunContext& context) {
+    const BlendDetail& detail = model->detail;
     const std::span<const Vec3f> positions = model->mesh.positions;
     const std::span<const Index> driver = model->driver().vertices;
 
@@ -74,13 +64,8 @@ Status Restorer::Content::prepare_blend(const RunContext& context) {
 }
 
 std::vector<Mat3f> Restorer::Content::gradients(const Pose& pose, const RunContext& context) const {
-    if (!blend) return {};
-    if (pose.gradients.empty() && pose.ghosts.empty()) return fit(context.threads()).fit(pose.positions, law, context);
-    std::vector<Mat3f> given = pose.gradients.empty()
-                                   ? fit(context.threads()).fit_to_ghosts(pose.positions, pose.ghosts, context)
-                                   : pose.gradients;
-    if (options.thin_shell) fit(context.threads()).make_shell(given, law);
-    return given;
+    if (!pose.gradients.empty()) return pose.gradients;
+    return fit(context.threads()).fit(pose.positions, context);
 }
 
 Result<unsigned> restored_level(const Model& model, const RestoreOptions& options) {
@@ -101,7 +86,6 @@ Status check_pose(std::size_t driver, const Pose& pose) {
     };
     if (pose.positions.size() != driver) return wrong(pose.positions.size(), "vertices");
     if (!pose.gradients.empty() && pose.gradients.size() != driver) return wrong(pose.gradients.size(), "gradients");
-    if (!pose.ghosts.empty() && pose.ghosts.size() != driver) return wrong(pose.ghosts.size(), "ghost points");
     return Success{};
 }
 
@@ -115,29 +99,16 @@ Result<Restorer> Restorer::create(const Model& model, const RestoreOptions& opti
     if (!level) return level.error();
     auto content = std::make_unique<Content>();
     content->model = &model;
-    content->options = options;
-    content->level = *level;
     if (context.is_cancelled()) return cancelled_error();
-    content->rest = level_mesh(model, content->level);
-    if (content->level < model.finest_level()) content->vertices = model.levels[content->level].vertices;
+    content->rest = level_mesh(model, *level);
+    if (*level < model.finest_level()) content->vertices = model.levels[*level].vertices;
     content->vertex_of_normal = split_shared_normals(content->rest);
     if (context.is_cancelled()) return cancelled_error();
-    if (model.code() == DetailCode::blend) {
-        content->law = options.law.value_or(HeightLaw::proportional);
-        if (Status prepared = content->prepare_blend(context); !prepared) return prepared.error();
-    } else {
-        content->law = options.law.value_or(HeightLaw::inverse);
-        content->reference.emplace(std::get<ReferenceDetail>(model.detail), content->law, context);
-        if (context.is_cancelled()) return cancelled_error();
-    }
+    if (Status prepared = content->prepare(context); !prepared) return prepared.error();
     return Restorer(std::move(content));
 }
 
 std::size_t Restorer::vertex_count() const { return content_->rest.vertex_count(); }
-
-std::vector<Vec3f> Restorer::rest_ghosts() const {
-    return content_->blend ? content_->fit(0).rest_ghosts() : std::vector<Vec3f>{};
-}
 
 Result<std::vector<Mat3f>> Restorer::gradients(const Pose& pose, const RunContext& context) const {
     if (Status status = check_pose(*content_->model, pose); !status) return status.error();
@@ -157,17 +128,7 @@ Status Restorer::positions(const Pose& pose, std::span<Vec3f> out, const RunCont
         return Error{ErrorCode::mismatch, "There is room for " + std::to_string(out.size()) +
                                               " positions and the level has " + std::to_string(vertex_count()) + "."};
     if (context.is_cancelled()) return cancelled_error();
-    if (content.blend) {
-        content.blend->restore(pose.positions, content.gradients(pose, context), out, {}, true, context);
-        return Success{};
-    }
-    if (content.vertices.empty()) { // the finest level: ids and slots are the same
-        content.reference->restore(pose.positions, content.level, out, context);
-        return Success{};
-    }
-    std::vector<Vec3f> all = content.model->mesh.positions; // a damaged level may name others than come
-    content.reference->restore(pose.positions, content.level, all, context);
-    for (std::size_t v = 0; v < out.size(); ++v) out[v] = all[content.vertices[v]];
+    content.blend->restore(pose.positions, content.gradients(pose, context), out, {}, true, context);
     return Success{};
 }
 
@@ -180,27 +141,16 @@ Result<Mesh> Restorer::mesh(const Pose& pose, const RunContext& context) const {
 Result<Mesh> Restorer::mesh(const Pose& pose, std::span<const Mat3f> gradients, const RunContext& context) const {
     const Content& content = *content_;
     if (Status status = check_pose(*content.model, pose); !status) return status.error();
-    if (content.blend && gradients.size() != pose.positions.size())
+    if (gradients.size() != pose.positions.size())
         return Error{ErrorCode::mismatch, "There are " + std::to_string(gradients.size()) + " gradients for " +
                                               std::to_string(pose.positions.size()) + " driver vertices."};
     if (context.is_cancelled()) return cancelled_error();
     Mesh mesh = content.rest;
-    if (content.blend) {
-        const bool with_normals = content.has_vertex_normals();
-        content.blend->restore(pose.positions, gradients, mesh.positions,
-                               with_normals ? std::span(mesh.normals.values) : std::span<Vec3f>{}, true, context);
-        if (content.blend_normals)
-            content.blend_normals->restore(pose.positions, gradients, {}, mesh.normals.values, true, context);
-        return mesh;
-    }
-    Result<std::vector<Vec3f>> restored = positions(pose, context);
-    if (!restored) return restored.error();
-    mesh.positions = std::move(*restored);
-    if (!mesh.normals.empty()) {
-        const std::vector<Vec3f> normals = vertex_normals(mesh, mesh.positions, context);
-        for (std::size_t i = 0; i < mesh.normals.values.size(); ++i)
-            if (content.vertex_of_normal[i] != kNoIndex) mesh.normals.values[i] = normals[content.vertex_of_normal[i]];
-    }
+    const bool with_normals = content.has_vertex_normals();
+    content.blend->restore(pose.positions, gradients, mesh.positions,
+                           with_normals ? std::span(mesh.normals.values) : std::span<Vec3f>{}, true, context);
+    if (content.blend_normals)
+        content.blend_normals->restore(pose.positions, gradients, {}, mesh.normals.values, true, context);
     return mesh;
 }
 

@@ -10,10 +10,6 @@
 namespace filigree {
 
 struct RestoreOptions {
-    /// Unset: proportional for the blend code (uniform scale is exact), inverse for the reference code (the report).
-    /// With the blend code a law matters where gradients are estimated in flat places, and for thin shells.
-    std::optional<HeightLaw> law = {};
-    bool thin_shell = false; ///< blend code: bumps keep their shape (cloth, skin) instead of stretching with the body
     std::optional<unsigned> level = {}; ///< restore up to this level; unset: the finest
     bool operator==(const RestoreOptions&) const = default;
 };
@@ -39,8 +35,8 @@ public:
     /// Vertices of the restored level; the finest mesh's own, in its order, when no level was asked for.
     std::size_t vertex_count() const;
 
-    /// The gradients that `pose` is restored with: its own, or estimated from its ghosts or positions. Blend code; none
-    /// for the reference code, which has no use for them. Errors: as check_pose.
+    /// The gradients that `pose` is restored with: its own, or estimated from its positions. Errors: mismatch (the pose
+    /// has another number of vertices than the driver).
     Result<std::vector<Mat3f>> gradients(const Pose& pose, const RunContext& context) const;
 
     /// Positions of the level's vertices. Errors: mismatch (the pose has another number of vertices than the driver),
@@ -50,14 +46,11 @@ public:
     Status positions(const Pose& pose, std::span<Vec3f> out, const RunContext& context) const;
 
     /// The level as a mesh: positions, and the normals where the mesh came with normals (by the cofactor of the blended
-    /// gradient; computed anew from the faces for the reference code); every other attribute as it came.
+    /// gradient); every other attribute as it came.
     Result<Mesh> mesh(const Pose& pose, const RunContext& context) const;
     /// The same bytes with what gradients(pose) gave, for who asks for both: the work is done once. Errors: also
-    /// mismatch (another number of gradients than driver vertices, blend code).
+    /// mismatch (another number of gradients than driver vertices).
     Result<Mesh> mesh(const Pose& pose, std::span<const Mat3f> gradients, const RunContext& context) const;
-
-    /// Where the driver's ghost points are at rest (blend code; empty else).
-    std::vector<Vec3f> rest_ghosts() const;
 
 private:
     struct Content;

@@ -17,8 +17,8 @@ std::vector<BlendRestorer::Item> SampledRestorer::sample(std::size_t all, std::s
 }
 
 SampledRestorer::SampledRestorer(const Model& model, std::size_t most, const RunContext& context)
-    : items_(sample(model.vertex_count(), most)), restorer_(std::get<BlendDetail>(model.detail), model.mesh.positions,
-                                                            model.driver().vertices, items_, {}, context) {
+    : items_(sample(model.vertex_count(), most)),
+      restorer_(model.detail, model.mesh.positions, model.driver().vertices, items_, {}, context) {
     for (const BlendRestorer::Item& item : items_) rest_.push_back(model.mesh.positions[item.vertex]);
 }
 

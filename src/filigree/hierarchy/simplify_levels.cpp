@@ -1,9 +1,9 @@
 #include "filigree/hierarchy/simplify_levels.h"
 
 #include "filigree/core/parallel_for.h"
-#include "filigree/hierarchy/morton_order.h"
 #include "filigree/hierarchy/nearest_sources.h"
 #include "filigree/hierarchy/simplify.h"
+#include "filigree/mesh/morton.h"
 #include "filigree/mesh/normals.h"
 
 #include <algorithm>
@@ -71,26 +71,17 @@ std::vector<std::size_t> level_targets(std::size_t vertices, const StripOptions&
 
 constexpr double kAnyError = 1e6; // more than any
 
-bool begins_in_clusters(std::size_t places, const StripOptions& options) {
-    return !options.max_edge && places > options.one_piece;
-}
-
-/// How much further the driver may leave the mesh; none: as far as it likes.
-std::optional<double> error_left(const StripOptions& options, double error) {
-    if (!options.error) return std::nullopt;
-    return *options.error - error;
-}
-
 /// The mesh as it is taken down: first in clusters, over its own vertices, then in one piece.
 class Descent {
 public:
-    Descent(const WorkingMesh& work, const StripOptions& options, const ClusterLevels& clusters)
-        : work_(work), options_(options), clusters_(clusters),
-          is_clustered_(begins_in_clusters(work.surface.place_count, options)) {}
+    Descent(const WorkingMesh& work, const StripOptions& options)
+        : work_(work), options_(options), clusters_(work.positions),
+          is_clustered_(!options.max_edge && work.surface.place_count > options.one_piece) {}
 
     /// False: nothing could be removed.
     bool go_to(std::size_t target, SimplifiedLevels& result, const RunContext& context) {
-        const std::optional<double> max_error = error_left(options_, result.error);
+        std::optional<double> max_error; // how much further the driver may leave the mesh
+        if (options_.error) max_error = *options_.error - result.error;
         if (max_error && *max_error <= 0 && !result.levels.empty()) return false;
         const std::size_t before = current().size();
         Simplified simplified = one_level(target, max_error, result, context);
@@ -115,7 +106,8 @@ private:
     Simplified one_level(std::size_t target, std::optional<double> max_error, SimplifiedLevels& result,
                          const RunContext& context) {
         if (is_clustered_) {
-            std::optional<Simplified> simplified = clusters_.simplify(current(), target, max_error.value_or(kAnyError));
+            std::optional<Simplified> simplified =
+                clusters_.simplify(current(), target, max_error.value_or(kAnyError), context);
             is_clustered_ = simplified && simplified->vertex_count > options_.one_piece;
             if (!is_clustered_) {
                 if (simplified) left_ = std::move(simplified->triangles);
@@ -165,7 +157,7 @@ private:
 
     const WorkingMesh& work_;
     const StripOptions& options_;
-    const ClusterLevels& clusters_;
+    ClusterSimplifier clusters_;
     std::optional<std::vector<Triangle>> left_; ///< over the piece's vertices, once there is one, else the mesh's
     bool is_clustered_;
     std::vector<Vec3f> piece_positions_;
@@ -225,39 +217,13 @@ Result<WorkingMesh> make_working_mesh(const Mesh& mesh, const RunContext& contex
 }
 
 SimplifiedLevels simplify_levels(const WorkingMesh& work, const StripOptions& options, const RunContext& context) {
-    ClusterSimplifier clusters(work.positions);
-    return simplify_levels(
-        work, options,
-        {.simplify = [&](std::span<const Triangle> triangles, std::size_t target,
-                         double max_error) { return clusters.simplify(triangles, target, max_error, context); },
-         .take_removed = [&] { return clusters.take_removed(); }},
-        context);
-}
-
-std::optional<NextRound> next_round(std::size_t places, const StripOptions& options, std::span<const RoundLeft> made) {
-    const std::vector<std::size_t> targets = level_targets(places, options);
-    if (!begins_in_clusters(places, options) || made.size() >= targets.size()) return std::nullopt;
-    double error = 0;
-    bool has_level = false;
-    for (const RoundLeft& round : made) {
-        if (round.vertices <= options.one_piece) return std::nullopt;
-        error += round.error;
-        has_level |= round.has_fewer_triangles;
-    }
-    const double max_error = error_left(options, error).value_or(kAnyError);
-    if (max_error <= 0 && has_level) return std::nullopt;
-    return NextRound{targets[targets.size() - 1 - made.size()], max_error};
-}
-
-SimplifiedLevels simplify_levels(const WorkingMesh& work, const StripOptions& options, const ClusterLevels& clusters,
-                                 const RunContext& context) {
     const std::vector<std::size_t> targets = level_targets(work.surface.place_count, options);
     SimplifiedLevels result;
     if (work.surface.triangles.empty()) {
         result.levels.push_back(make_point_level(work, targets.front()));
         return result;
     }
-    Descent descent(work, options, clusters);
+    Descent descent(work, options);
     for (std::size_t k = targets.size(); k-- > 0 && !context.is_cancelled();) {
         context.report("simplify", 1 - double(k + 1) / double(targets.size()));
         const bool has_left_some = descent.go_to(targets[k], result, context);

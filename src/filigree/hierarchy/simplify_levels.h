@@ -7,8 +7,6 @@
 #include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/surface.h"
 
-#include <functional>
-
 namespace filigree {
 
 /// The mesh as the blend code sees it: welded, around the origin and about one unit large, so that no product leaves
@@ -37,28 +35,6 @@ struct SimplifiedLevels {
 
 /// Cancelled: the levels made so far.
 SimplifiedLevels simplify_levels(const WorkingMesh& work, const StripOptions& options, const RunContext& context);
-
-/// Who makes the levels of a large mesh that are made in clusters: ClusterSimplifier, or what made them before.
-struct ClusterLevels {
-    /// As of ClusterSimplifier.
-    std::function<std::optional<Simplified>(std::span<const Triangle>, std::size_t target, double max_error)> simplify;
-    std::function<RemovedVertices()> take_removed;
-};
-SimplifiedLevels simplify_levels(const WorkingMesh& work, const StripOptions& options, const ClusterLevels& clusters,
-                                 const RunContext& context);
-
-/// What a round of clusters has left.
-struct RoundLeft {
-    std::size_t vertices = 0;
-    double error = 0;
-    bool has_fewer_triangles = false; ///< than before
-};
-/// What the next round of clusters is to leave, after those that were made. None: the rest is one piece.
-struct NextRound {
-    std::size_t target = 0;
-    double max_error = 0;
-};
-std::optional<NextRound> next_round(std::size_t places, const StripOptions& options, std::span<const RoundLeft> made);
 
 /// The driver's vertex nearest to each of the mesh's along the surface; loose parts hang on the surface beside them.
 /// What clusters took away follows what they left. Cost as of hang_loose_parts.

@@ -140,11 +140,7 @@ Result<Skin> make_skin(const Model& model, unsigned level, unsigned influences, 
     if (influences != 3 && influences != 6)
         return Error{ErrorCode::usage, "A skin has 3 or 6 influences, not " + std::to_string(influences) + "."};
     if (const Result<unsigned> found = restored_level(model, {.level = level}); !found) return found.error();
-    if (model.code() != DetailCode::blend)
-        return Error{ErrorCode::unsuitable,
-                     "The model has the reference code, whose levels follow one another, so no skin "
-                     "can play it; the blend code can be a skin, and both codes can be morph targets."};
-    const BlendDetail& detail = std::get<BlendDetail>(model.detail);
+    const BlendDetail& detail = model.detail;
     const std::span<const Vec3f> positions = model.mesh.positions;
     std::vector<Vec3d> driver;
     for (Index v : model.driver().vertices) driver.push_back(positions[v].cast<double>());

@@ -35,7 +35,7 @@ struct Skin {
 
 /// The skin of level k. Weights are rounded to multiples of 1 / 65535 before positions are computed from them, so that
 /// rounding does not move the rest shape; `exact` leaves them as floats. influences: 3 or 6.
-/// Errors: usage (no such level, other influences), unsuitable (reference code). Cost O(V).
+/// Errors: usage (no such level, other influences). Cost O(V).
 Result<Skin> make_skin(const Model& model, unsigned level, unsigned influences, bool exact);
 
 /// How a joint stands in one moment: world = [matrix | translation].

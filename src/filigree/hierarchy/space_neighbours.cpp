@@ -2,6 +2,7 @@
 
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/mesh/morton.h"
 #include "filigree/mesh/weld.h"
 
 #include <algorithm>
@@ -51,15 +52,6 @@ private:
     nanoflann::KDTreeSingleIndexAdaptor<Metric, PointTree, 3, Index> tree_;
 };
 
-/// The bits of x, two zeros between each.
-std::uint64_t spread_bits(std::uint64_t x) {
-    x = (x | x << 32) & 0x001f00000000ffff;
-    x = (x | x << 16) & 0x001f0000ff0000ff;
-    x = (x | x << 8) & 0x100f00f00f00f00f;
-    x = (x | x << 4) & 0x10c30c30c30c30c3;
-    return (x | x << 2) & 0x1249249249249249;
-}
-
 /// One in kThinning of the vertices, spread evenly: every so many along a Morton curve.
 std::vector<Index> thinned(std::span<const Vec3f> positions, std::span<const Index> vertices) {
     Box box;
@@ -68,9 +60,7 @@ std::vector<Index> thinned(std::span<const Vec3f> positions, std::span<const Ind
     std::vector<std::pair<std::uint64_t, Index>> curve;
     for (Index v : vertices) {
         const Vec3d q = (positions[v].cast<double>() - box.min) / side * double((1 << 21) - 1);
-        std::uint64_t code = 0;
-        for (int k = 0; k < 3; ++k) code |= spread_bits(static_cast<std::uint64_t>(q[k])) << k;
-        curve.emplace_back(code, v);
+        curve.emplace_back(morton_key(std::uint64_t(q.x()), std::uint64_t(q.y()), std::uint64_t(q.z())), v);
     }
     std::sort(curve.begin(), curve.end());
     std::vector<Index> some;
@@ -139,12 +129,9 @@ private:
         }
         std::sort(edges.begin(), edges.end());
         edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-        links_.offsets.assign(vertex_count() + 1, 0);
-        for (const auto& [from, to] : edges) {
-            ++links_.offsets[from + 1];
-            links_.items.push_back(to);
-        }
-        for (std::size_t v = 0; v < vertex_count(); ++v) links_.offsets[v + 1] += links_.offsets[v];
+        links_ = make_lists<Index>(vertex_count(), [&](const auto& add) {
+            for (const auto& [from, to] : edges) add(from, to);
+        });
     }
 
     void split_into_parts() {

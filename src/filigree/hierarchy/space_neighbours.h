@@ -2,7 +2,8 @@
 #pragma once
 
 #include "filigree/core/run_context.h"
-#include "filigree/mesh/incidence.h"
+#include "filigree/mesh/edges.h"
+#include "filigree/mesh/mesh.h"
 
 namespace filigree {
 

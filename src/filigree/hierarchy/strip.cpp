@@ -108,74 +108,6 @@ std::optional<Error> check_level(const Mesh& mesh, const Level& driver) {
     return std::nullopt;
 }
 
-Result<Stripped> strip_blend(Mesh mesh, const StripOptions& options, const RunContext& context) {
-    Stripped result;
-    const double simplify_start = now_seconds();
-    if (options.reorder) {
-        result.model.source_order = order_by_place(mesh, context);
-        mesh = with_vertex_order(std::move(mesh), result.model.source_order, context);
-    }
-    const Result<WorkingMesh> work = make_working_mesh(mesh, context);
-    if (!work) return work.error();
-    result.report.welded_vertices = mesh.vertex_count() - work->surface.place_count;
-    SimplifiedLevels simplified = simplify_levels(*work, options, context);
-    if (context.is_cancelled()) return cancelled_error();
-    std::vector<Level>& levels = simplified.levels;
-    result.report.simplify_error = simplified.error;
-    result.report.forced_collapses = simplified.forced;
-    result.report.simplify_seconds = now_seconds() - simplify_start;
-
-    const double bind_start = now_seconds();
-    Cells cells = make_cells(levels.front());
-    const NearestDriver nearest = nearest_driver_vertices(*work, simplified, context);
-    Result<Binding> binding = bind_to_driver(work->positions, work->surface, work->normals, cells.global, nearest,
-                                             simplified.removed, context);
-    if (!binding) return binding.error();
-    result.report.across_gap = binding->across_gap.size();
-    result.report.facing_away = binding->facing_away.size();
-    result.report.bind_seconds = now_seconds() - bind_start;
-
-    const double encode_start = now_seconds();
-    result.model.detail =
-        encode_blend(mesh.positions, levels.front().vertices, std::move(cells.local), *binding, options.precision);
-    result.model.levels = std::move(levels);
-    result.model.mesh = std::move(mesh);
-    split_shared_normals(result.model.mesh);
-    result.report.encode_seconds = now_seconds() - encode_start;
-    return result;
-}
-
-Result<Stripped> strip_reference(Mesh mesh, const StripOptions& options, const RunContext& context) {
-    Stripped result;
-    const double start = now_seconds();
-    ReferenceOptions reference_options{.references = options.references};
-    if (options.levels) reference_options.max_levels = *options.levels;
-    if (options.base) { // the number of levels whose driver comes closest to the vertices asked for
-        const double ratio = double(mesh.vertex_count()) / double(std::max<std::size_t>(*options.base, 1));
-        reference_options.max_levels = static_cast<unsigned>(std::lround(std::max(0.0, std::log2(ratio) / 2)));
-        reference_options.max_levels = std::max(1u, reference_options.max_levels);
-    }
-    Result<ReferenceDetail> detail = encode_reference(mesh, reference_options, context);
-    if (!detail) return detail.error();
-    const ReferenceRestorer restorer(*detail, HeightLaw::keep, context);
-    std::vector<Index> local(mesh.vertex_count(), kNoIndex);
-    for (unsigned k = 0; k < detail->patches.levels; ++k) {
-        Level level;
-        level.vertices = restorer.level_vertices(k);
-        for (Index i = 0; i < level.vertices.size(); ++i) local[level.vertices[i]] = i;
-        for (const auto& quad : restorer.level_quads(k)) {
-            for (Index v : quad) level.corners.push_back(local[v]);
-            level.face_offsets.push_back(static_cast<Index>(level.corners.size()));
-        }
-        result.model.levels.push_back(std::move(level));
-    }
-    result.model.detail = std::move(*detail);
-    result.model.mesh = std::move(mesh);
-    split_shared_normals(result.model.mesh);
-    result.report.encode_seconds = now_seconds() - start;
-    return result;
-}
-
 } // namespace
 
 std::optional<Error> check_strip(const Mesh& mesh, const StripOptions& options) {
@@ -188,14 +120,8 @@ std::optional<Error> check_strip(const Mesh& mesh, const StripOptions& options) 
         return Error{ErrorCode::usage, "levels must be 1 to 16."};
     if (options.error && !(*options.error > 0 && *options.error <= 1))
         return Error{ErrorCode::usage, "error must be above 0 and at most 1: it is a fraction of the diagonal."};
-    if (options.code == DetailCode::reference && options.error)
-        return Error{ErrorCode::usage, "The reference code removes whole levels: give base or levels, not error."};
-    if (options.code == DetailCode::reference && options.reorder)
-        return Error{ErrorCode::usage, "The reference code orders vertices by itself: reorder is for the blend code."};
     if (options.max_edge && !(*options.max_edge > 0 && *options.max_edge <= 1))
         return Error{ErrorCode::usage, "max_edge must be above 0 and at most 1: it is a fraction of the diagonal."};
-    if (options.code == DetailCode::reference && options.max_edge)
-        return Error{ErrorCode::usage, "The reference code removes whole levels: max_edge is for the blend code."};
     if (mesh.vertex_count() == 0) return Error{ErrorCode::unsuitable, "The mesh has no vertices: nothing to strip."};
     return std::nullopt;
 }
@@ -282,8 +208,40 @@ Result<Model> bind_to_own_driver(Mesh mesh, Level driver, Precision precision, c
 
 Result<Stripped> strip(Mesh mesh, const StripOptions& options, const RunContext& context) {
     if (std::optional<Error> error = check_strip(mesh, options)) return *error;
-    return options.code == DetailCode::blend ? strip_blend(std::move(mesh), options, context)
-                                             : strip_reference(std::move(mesh), options, context);
+    Stripped result;
+    const double simplify_start = now_seconds();
+    if (options.reorder) {
+        result.model.source_order = order_by_place(mesh, context);
+        mesh = with_vertex_order(std::move(mesh), result.model.source_order, context);
+    }
+    const Result<WorkingMesh> work = make_working_mesh(mesh, context);
+    if (!work) return work.error();
+    result.report.welded_vertices = mesh.vertex_count() - work->surface.place_count;
+    SimplifiedLevels simplified = simplify_levels(*work, options, context);
+    if (context.is_cancelled()) return cancelled_error();
+    std::vector<Level>& levels = simplified.levels;
+    result.report.simplify_error = simplified.error;
+    result.report.forced_collapses = simplified.forced;
+    result.report.simplify_seconds = now_seconds() - simplify_start;
+
+    const double bind_start = now_seconds();
+    Cells cells = make_cells(levels.front());
+    const NearestDriver nearest = nearest_driver_vertices(*work, simplified, context);
+    Result<Binding> binding = bind_to_driver(work->positions, work->surface, work->normals, cells.global, nearest,
+                                             simplified.removed, context);
+    if (!binding) return binding.error();
+    result.report.across_gap = binding->across_gap.size();
+    result.report.facing_away = binding->facing_away.size();
+    result.report.bind_seconds = now_seconds() - bind_start;
+
+    const double encode_start = now_seconds();
+    result.model.detail =
+        encode_blend(mesh.positions, levels.front().vertices, std::move(cells.local), *binding, options.precision);
+    result.model.levels = std::move(levels);
+    result.model.mesh = std::move(mesh);
+    split_shared_normals(result.model.mesh);
+    result.report.encode_seconds = now_seconds() - encode_start;
+    return result;
 }
 
 } // namespace filigree

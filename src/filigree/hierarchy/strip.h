@@ -8,23 +8,20 @@
 namespace filigree {
 
 struct StripOptions {
-    DetailCode code = DetailCode::blend;
     // How coarse the driver is; at most one of the three. With none: 1,000 vertices, fewer for meshes below 20,000
-    // (a twentieth, at least 50) and all of them below 50; for the reference code as far as it goes. Vertices at one
-    // place count once.
+    // (a twentieth, at least 50) and all of them below 50. Vertices at one place count once.
     std::optional<std::size_t> base = {}; ///< driver vertices, about; 3 or more
     std::optional<unsigned> levels = {};  ///< levels below the finest, each with a quarter of the vertices of the next
     std::optional<double> error = {};     ///< how far the driver may leave the mesh, fraction of the diagonal (rms)
     /// Longest edge that simplification may leave, fraction of the diagonal; edges of the mesh itself may be longer.
-    /// Flat parts then keep vertices, and there may be more than asked for above. Blend code only.
+    /// Flat parts then keep vertices, and there may be more than asked for above.
     std::optional<double> max_edge = {};
-    Precision precision = Precision::float32; ///< blend code only
-    unsigned references = 3;                  ///< reference code only: 3, 4 or 6
-    /// Larger levels are simplified in clusters on all threads, in time that grows as the mesh does, and those from so
-    /// many vertices on in one piece. Blend code without max_edge only.
+    Precision precision = Precision::float32;
+    /// Levels of more vertices are simplified in parallel clusters, in time that grows as the mesh does; smaller ones
+    /// in one piece. With max_edge all are made in one piece.
     std::size_t one_piece = 600'000;
     /// The mesh's vertices are put in order_by_place() first, and Model::source_order says where they were: for meshes
-    /// whose order is hopeless, which restore slowly. Blend code only.
+    /// whose order is hopeless, which restore slowly.
     bool reorder = false;
     bool operator==(const StripOptions&) const = default;
 };
@@ -45,10 +42,9 @@ struct Stripped {
     StripReport report;
 };
 
-/// Strips a mesh. The blend code takes every mesh that has a vertex: what it cannot bind well it counts. The reference
-/// code needs quads with subdivision connectivity.
+/// Strips any mesh that has a vertex: the report counts what could not be bound well.
 /// Errors: usage (options that make no sense; check_mesh refuses the mesh), unsuitable (no vertices; more triangles
-/// than kMostListedTriangles, see mesh/incidence.h; no subdivision connectivity), cancelled. Cost O(F) while the mesh
+/// than kMostListedTriangles, see mesh/edges.h), cancelled. Cost O(F) while the mesh
 /// has more than StripOptions::one_piece vertices, and O(F log F) for what is simplified in one piece: about 3
 /// processor seconds a million vertices. Same bytes for any number of threads.
 Result<Stripped> strip(Mesh mesh, const StripOptions& options, const RunContext& context);

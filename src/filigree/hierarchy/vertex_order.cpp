@@ -1,7 +1,7 @@
 #include "filigree/hierarchy/vertex_order.h"
 
 #include "filigree/core/parallel_for.h"
-#include "filigree/hierarchy/morton_order.h"
+#include "filigree/mesh/morton.h"
 
 #include <tbb/parallel_sort.h>
 
@@ -44,12 +44,6 @@ Mesh with_vertex_order(Mesh mesh, std::span<const Index> order, const RunContext
         for (std::size_t c = begin; c < end; ++c) mesh.corners[c] = place[mesh.corners[c]];
     });
     return mesh;
-}
-
-std::vector<Index> inverse_order(std::span<const Index> order) {
-    std::vector<Index> inverse(order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) inverse[order[i]] = static_cast<Index>(i);
-    return inverse;
 }
 
 } // namespace filigree

@@ -1,6 +1,7 @@
 // Vertices in another order: what is near in space lies together, so that restoring streams through memory.
 #pragma once
 
+#include "filigree/core/lists.h"
 #include "filigree/core/run_context.h"
 #include "filigree/mesh/mesh.h"
 
@@ -14,10 +15,7 @@ namespace filigree {
 std::vector<Index> order_by_place(const Mesh& mesh, const RunContext& context);
 
 /// The mesh whose vertex i was vertex order[i]; order has each vertex once. Faces, and attributes of faces and corners,
-/// stay in their order. The mesh is not checked. Cost O(size).
+/// stay in their order. inverse_order (core/lists.h) undoes it. The mesh is not checked. Cost O(size).
 Mesh with_vertex_order(Mesh mesh, std::span<const Index> order, const RunContext& context);
-
-/// What undoes it: where each vertex went.
-std::vector<Index> inverse_order(std::span<const Index> order);
 
 } // namespace filigree

@@ -1,7 +1,7 @@
 #include "filigree/io/file.h"
+#include "filigree/core/large_memory.h"
 #include "filigree/io/file_descriptor.h"
 #include "filigree/io/file_error.h"
-#include "filigree/io/large_memory.h"
 #include "filigree/io/temporary_file.h"
 
 #include <algorithm>

@@ -74,11 +74,11 @@ private:
 
 } // namespace
 
-Status write_glb_moments(std::size_t frames, double frames_per_second, double keys_per_second,
-                         const std::function<Result<MeshMoment>(std::size_t frame)>& moment,
+Status write_glb_moments(const FrameSource<MeshMoment>& moments, double keys_per_second,
                          const std::filesystem::path& path, const RunContext& context) {
+    const std::size_t frames = moments.frames;
     if (frames == 0) return Error{ErrorCode::unsuitable, path.string() + ": there are no frames to write."};
-    const double ratio = frames_per_second / keys_per_second;
+    const double ratio = moments.frames_per_second / keys_per_second;
     if (!(keys_per_second > 0) || !(ratio > 0) || !std::isfinite(ratio))
         return Error{ErrorCode::usage, "Keys a second have to be above 0."};
     const auto every = static_cast<std::size_t>(std::clamp(std::round(ratio), 1.0, double(frames)));
@@ -87,12 +87,13 @@ Status write_glb_moments(std::size_t frames, double frames_per_second, double ke
         for (std::size_t frame = 0; frame < frames; ++frame) {
             context.report("writing", double(frame) / double(frames));
             if (context.is_cancelled()) return cancelled_error();
-            const Result<MeshMoment> now = moment(frame);
+            const Result<MeshMoment> now = moments.frame(frame);
             if (!now) return now.error();
             if (frame % every != 0 && frame + 1 != frames) continue;
-            if (Status added = writer.add(now->mesh, double(frame) / frames_per_second, context); !added) return added;
+            if (Status added = writer.add(now->mesh, double(frame) / moments.frames_per_second, context); !added)
+                return added;
         }
-        return writer.write(path, double(frames - 1) / frames_per_second, context);
+        return writer.write(path, double(frames - 1) / moments.frames_per_second, context);
     } catch (const std::bad_alloc&) {
         return Error{ErrorCode::out_of_memory, path.string() + ": its keys do not fit into memory; take fewer."};
     }

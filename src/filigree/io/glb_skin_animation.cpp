@@ -145,7 +145,7 @@ private:
 
 } // namespace
 
-void SkinAnimation::plan(const PoseStream& stream, const SkinOptions& options) {
+void SkinAnimation::plan(const FrameSource<Pose>& stream, const SkinOptions& options) {
     const double duration = double(stream.frames - 1) / stream.frames_per_second;
     const double rate = options.key_rate.value_or(stream.frames_per_second);
     std::vector<double> keys;
@@ -178,7 +178,7 @@ void SkinAnimation::plan(const PoseStream& stream, const SkinOptions& options) {
     }
 }
 
-Result<SkinAnimation> SkinAnimation::sample(const Skin& skin, const PoseStream& stream, PoseSampler& poses,
+Result<SkinAnimation> SkinAnimation::sample(const Skin& skin, const FrameSource<Pose>& stream, PoseSampler& poses,
                                             const Restorer& restorer, const SkinOptions& options,
                                             const RunContext& context) {
     constexpr double kMostBytes = 4294967296.0, kBytesAKey = 40; // of a joint, at 16 bits

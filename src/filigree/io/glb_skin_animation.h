@@ -23,7 +23,7 @@ class SkinAnimation {
 public:
     /// Errors: those of the poses; unsupported (more than a GLB can hold, found before the work); cancelled.
     /// Memory: 48 bytes a joint and sample.
-    static Result<SkinAnimation> sample(const Skin& skin, const PoseStream& stream, PoseSampler& poses,
+    static Result<SkinAnimation> sample(const Skin& skin, const FrameSource<Pose>& stream, PoseSampler& poses,
                                         const Restorer& restorer, const SkinOptions& options,
                                         const RunContext& context);
 
@@ -45,7 +45,7 @@ private:
     std::vector<std::vector<Vec3f>> translations_; ///< the same
     double normal_error_degrees_ = 0;
 
-    void plan(const PoseStream& stream, const SkinOptions& options);
+    void plan(const FrameSource<Pose>& stream, const SkinOptions& options);
 };
 
 } // namespace filigree

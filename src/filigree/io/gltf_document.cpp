@@ -1,4 +1,5 @@
 #include "filigree/io/gltf_document.h"
+#include "filigree/io/file.h"
 #include "filigree/io/text_scanner.h"
 
 #include <algorithm>
@@ -6,7 +7,6 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 
 namespace filigree::gltf {
 
@@ -419,14 +419,10 @@ std::string Document::resource(const Value& uri, std::size_t limit) const {
     }
     const std::string name = decode_percent(text);
     const std::filesystem::path path = beside(uri, name);
-    std::error_code failed;
-    const std::uintmax_t size = std::filesystem::file_size(path, failed);
-    std::ifstream file(path, std::ios::binary);
-    if (failed || !file) uri.fail("the file " + in_quotes(name) + " cannot be opened.", ErrorCode::not_found);
-    std::string bytes(std::min<std::uintmax_t>(size, limit), '\0');
-    file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    if (file.gcount() != static_cast<std::streamsize>(bytes.size()))
-        uri.fail("the file " + in_quotes(name) + " cannot be read.", ErrorCode::not_found);
+    const Result<FileReader> file = FileReader::open(path);
+    if (!file) uri.fail("the file " + in_quotes(name) + " cannot be opened.", ErrorCode::not_found);
+    std::string bytes(std::min<std::uint64_t>(file->size(), limit), '\0');
+    if (!file->read(0, bytes)) uri.fail("the file " + in_quotes(name) + " cannot be read.", ErrorCode::not_found);
     return bytes;
 }
 

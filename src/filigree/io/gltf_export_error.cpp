@@ -5,13 +5,13 @@
 
 namespace filigree {
 
-PoseSampler::PoseSampler(const PoseStream& stream, std::function<Status(const Pose&)> check)
+PoseSampler::PoseSampler(const FrameSource<Pose>& stream, std::function<Status(const Pose&)> check)
     : stream_(stream), check_(std::move(check)) {}
 
 Result<const Pose*> PoseSampler::frame(std::size_t number) {
     for (const Kept& kept : kept_)
         if (kept.frame == number) return &kept.pose;
-    Result<Pose> pose = stream_.pose(number);
+    Result<Pose> pose = stream_.frame(number);
     if (!pose) return pose.error();
     if (Status fine = check_(*pose); !fine) return fine.error();
     if (kept_.size() == 2) kept_.erase(kept_.begin());
@@ -36,7 +36,6 @@ Result<Pose> PoseSampler::at(double seconds) {
     };
     blend(pose.positions, (*second)->positions);
     blend(pose.gradients, (*second)->gradients);
-    blend(pose.ghosts, (*second)->ghosts);
     return pose;
 }
 

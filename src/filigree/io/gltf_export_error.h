@@ -14,7 +14,7 @@ namespace filigree {
 class PoseSampler {
 public:
     /// check: asked of every frame before it is used. The stream must outlive the sampler.
-    PoseSampler(const PoseStream& stream, std::function<Status(const Pose&)> check);
+    PoseSampler(const FrameSource<Pose>& stream, std::function<Status(const Pose&)> check);
     /// seconds: 0 .. (frames - 1) / frames_per_second; held at the ends.
     Result<Pose> at(double seconds);
 
@@ -23,7 +23,7 @@ private:
         std::size_t frame;
         Pose pose;
     };
-    const PoseStream& stream_;
+    const FrameSource<Pose>& stream_;
     std::function<Status(const Pose&)> check_;
     std::vector<Kept> kept_; ///< the last two frames asked for
 

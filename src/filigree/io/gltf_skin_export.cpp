@@ -87,7 +87,8 @@ void add_influences(GlbBuilder& builder, const GlbParts& parts, const Skin& skin
 /// Puts one skinned file together.
 class SkinExport {
 public:
-    SkinExport(const Model& model, const PoseStream& poses, const SkinOptions& options, const RunContext& context)
+    SkinExport(const Model& model, const FrameSource<Pose>& poses, const SkinOptions& options,
+               const RunContext& context)
         : model_(model), poses_(poses), options_(options), context_(context), levels_(model, options.materials_beside) {
     }
 
@@ -135,7 +136,7 @@ public:
 
 private:
     const Model& model_;
-    const PoseStream& poses_;
+    const FrameSource<Pose>& poses_;
     const SkinOptions& options_;
     const RunContext& context_;
     GlbBuilder builder_;
@@ -282,7 +283,7 @@ private:
 
 } // namespace
 
-Result<ExportReport> write_skin_glb(const Model& model, const PoseStream& poses, const SkinOptions& options,
+Result<ExportReport> write_skin_glb(const Model& model, const FrameSource<Pose>& poses, const SkinOptions& options,
                                     const std::filesystem::path& path, const RunContext& context) {
     try {
         return SkinExport(model, poses, options, context).write(path);

@@ -32,10 +32,10 @@ struct SkinOptions {
 
 /// The model's animation as a plain glTF 2.0 skin (docs/exchange.md): no extension, and the mesh at rest while nothing
 /// plays. The error is measured by reading the file's own bytes, and stored in asset.extras.filigree.
-/// Errors: unsuitable (reference code; no frames), mismatch (a pose of another driver), usage (level, rates),
+/// Errors: unsuitable (no frames), mismatch (a pose of another driver), usage (level, rates),
 /// unwritable, unsupported (4 GiB), out_of_memory, cancelled. Cost: a few restores a key. Memory: the file once, and
 /// what the reader makes of its meshes.
-Result<ExportReport> write_skin_glb(const Model& model, const PoseStream& poses, const SkinOptions& options,
+Result<ExportReport> write_skin_glb(const Model& model, const FrameSource<Pose>& poses, const SkinOptions& options,
                                     const std::filesystem::path& path, const RunContext& context);
 
 } // namespace filigree

@@ -1,5 +1,7 @@
 #include "filigree/io/handles_file.h"
 
+#include "filigree/core/view.h"
+
 #include "filigree/io/file.h"
 #include "filigree/io/text_scanner.h"
 
@@ -79,7 +81,7 @@ Eigen::AngleAxisd read_rotation(const HandlesJson& json) {
     const Vec3d axis = read_vec(json, "axis", "the handle");
     if (axis.isZero(0)) throw BadHandle{"'axis' must not be zero"};
     const double degrees = read_number(json, "degrees", "the handle");
-    return Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis.stableNormalized());
+    return Eigen::AngleAxisd(radians(degrees), axis.stableNormalized());
 }
 
 HandleRegion read_region(const HandlesJson& json) {

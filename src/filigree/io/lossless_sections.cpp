@@ -16,9 +16,9 @@ enum class Way : char { plain, numbers, second_order, corners, values, records }
 constexpr std::uint32_t kPoseBlock = 32; ///< frames that are expected from the one before; the first of them is not
 
 bool holds_floats(const std::string& name) {
-    static const std::set<std::string_view> kNames = {"mesh.pos", "uv.val", "nrm.val", "col.val",  "scal.val",
-                                                      "ck.box",   "bl.u",   "bl.v",    "bl.scale", "drv.pos",
-                                                      "rf.ext",   "rf.drv", "rf.rec",  "pose.pos", "pose.grd"};
+    static const std::set<std::string_view> kNames = {"mesh.pos", "uv.val",  "nrm.val",  "col.val",
+                                                      "scal.val", "ck.box",  "bl.u",     "bl.v",
+                                                      "bl.scale", "drv.pos", "pose.pos", "pose.grd"};
     return kNames.contains(name);
 }
 

@@ -96,14 +96,13 @@ Box ModelChunks::box(std::size_t k) const {
 Result<ModelChunks> ModelChunks::open(FileReader file, const std::string& name, const RunContext& context) {
     const Result<ModelOutline> outline = read_model_outline(file, name, context);
     if (!outline) return outline.error();
-    if (outline->code != DetailCode::blend) return no_chunks(name, "has the reference code");
+    if (outline->references > 0) return no_chunks(name, "has the reference code");
     if (outline->coding) return no_chunks(name, "is coded in one piece");
     Result<Mesh> driver = read_model_level(file, 0, name, context);
     if (!driver) return driver.error();
     auto content = std::make_unique<Content>(std::move(file), name);
     try {
         const SectionReader& in = content->sections.emplace(content->file);
-        if (in.version() < 2) return no_chunks(name, "is a file of version 1");
         content->vertices = outline->levels.back().vertices;
         content->all_vertices = content->vertices + (outline->driver_is_behind ? outline->levels.front().vertices : 0);
         if (content->all_vertices >= kNoIndex || in.count("bl.run").first != chunk_count(content->all_vertices))
@@ -155,16 +154,16 @@ struct KnownPoses {
     std::vector<Pose> poses;
 };
 
-Result<KnownPoses> poses_with_gradients(const Restorer& driver, const PoseStream& stream, std::size_t first,
+Result<KnownPoses> poses_with_gradients(const Restorer& driver, const FrameSource<Pose>& stream, std::size_t first,
                                         std::size_t last, const RunContext& silent) {
     KnownPoses known{first, {}};
     for (std::size_t frame = first; frame < last; ++frame) {
         if (silent.is_cancelled()) return cancelled_error();
-        Result<Pose> pose = stream.pose(frame);
+        Result<Pose> pose = stream.frame(frame);
         if (!pose) return pose.error();
         Result<std::vector<Mat3f>> gradients = driver.gradients(*pose, silent);
         if (!gradients) return gradients.error();
-        known.poses.push_back({std::move(pose->positions), std::move(*gradients), {}});
+        known.poses.push_back({std::move(pose->positions), std::move(*gradients)});
     }
     return known;
 }
@@ -172,7 +171,7 @@ Result<KnownPoses> poses_with_gradients(const Restorer& driver, const PoseStream
 /// Restores frames first to last - 1, chunk by chunk, into a PC2.
 class ChunkRestoration {
 public:
-    ChunkRestoration(const ModelChunks& model, const PoseStream& poses, const std::filesystem::path& path,
+    ChunkRestoration(const ModelChunks& model, const FrameSource<Pose>& poses, const std::filesystem::path& path,
                      const RunContext& context)
         : model_(model), poses_(poses), context_(context), silent_(context),
           frames_(animation_, path, model.driver().mesh.origin) {
@@ -225,7 +224,7 @@ private:
     }
 
     const ModelChunks& model_;
-    const PoseStream& poses_;
+    const FrameSource<Pose>& poses_;
     const RunContext& context_;
     RunContext silent_;
     MeshAnimation animation_;
@@ -246,7 +245,7 @@ Status check_chunk_output(const RestoreOptions& options, const std::filesystem::
 
 } // namespace
 
-Result<std::vector<std::string>> write_restored_chunks(const ModelChunks& model, const PoseStream& poses,
+Result<std::vector<std::string>> write_restored_chunks(const ModelChunks& model, const FrameSource<Pose>& poses,
                                                        const RestoreOptions& options, const std::filesystem::path& path,
                                                        const RunContext& context) {
     if (Status sound = check_chunk_output(options, path); !sound) return sound.error();
@@ -270,7 +269,7 @@ Result<std::vector<std::string>> write_restored_chunks(const ModelChunks& model,
     return warnings;
 }
 
-Result<ChunkReport> write_restored_chunks(const ModelChunks& model, const PoseStream& poses,
+Result<ChunkReport> write_restored_chunks(const ModelChunks& model, const FrameSource<Pose>& poses,
                                           const RestoreOptions& options, const std::filesystem::path& path,
                                           const WorkChunk& chunk, const RunContext& context) {
     if (Status sound = check_chunk_output(options, path); !sound) return sound.error();

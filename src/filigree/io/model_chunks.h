@@ -10,8 +10,8 @@ namespace filigree {
 /// The driver of a model with the blend code, and its vertices in chunks that are read when they are asked for.
 class ModelChunks {
 public:
-    /// The file is kept open. Errors: as read_model; unsuitable (a file of version 1, or the reference code: those have
-    /// no chunks).
+    /// The file is kept open. Errors: as read_model; unsuitable (a packed file or the reference code: those have no
+    /// chunks).
     static Result<ModelChunks> open(FileReader file, const std::string& name, const RunContext& context);
     ModelChunks(ModelChunks&&) noexcept;
     ModelChunks& operator=(ModelChunks&&) noexcept;
@@ -37,12 +37,12 @@ private:
 /// Restores poses into a .pc2 without ever having the mesh in memory: the same bytes as write_animation. options: their
 /// level is the finest. Memory: a chunk, the driver, and the driver's gradients in as many frames as 256 MB hold.
 /// Errors: as write_animation and ModelChunks; mismatch (a pose of another driver); usage (a level).
-Result<std::vector<std::string>> write_restored_chunks(const ModelChunks& model, const PoseStream& poses,
+Result<std::vector<std::string>> write_restored_chunks(const ModelChunks& model, const FrameSource<Pose>& poses,
                                                        const RestoreOptions& options, const std::filesystem::path& path,
                                                        const RunContext& context);
 
 /// One part of the frames, as write_animation_chunk.
-Result<ChunkReport> write_restored_chunks(const ModelChunks& model, const PoseStream& poses,
+Result<ChunkReport> write_restored_chunks(const ModelChunks& model, const FrameSource<Pose>& poses,
                                           const RestoreOptions& options, const std::filesystem::path& path,
                                           const WorkChunk& chunk, const RunContext& context);
 

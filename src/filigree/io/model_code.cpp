@@ -14,7 +14,7 @@ namespace filigree {
 
 namespace {
 
-std::string stream_of(const SectionReader& in, std::string_view name, std::uint32_t index = 0) {
+std::string frames_of(const SectionReader& in, std::string_view name, std::uint32_t index = 0) {
     const std::vector<char> bytes = in.array<char>(name, index);
     return {bytes.begin(), bytes.end()};
 }
@@ -22,7 +22,7 @@ std::string stream_of(const SectionReader& in, std::string_view name, std::uint3
 Level driver_of(const SectionReader& in, const FileCode& code) {
     const std::size_t among = is_made_elsewhere(in) ? code.driver_vertices : code.vertices;
     std::optional<DriverFaces> driver =
-        decode_driver(stream_of(in, "cd.drv"), {code.driver_vertices, code.driver_faces, code.driver_corners, among});
+        decode_driver(frames_of(in, "cd.drv"), {code.driver_vertices, code.driver_faces, code.driver_corners, among});
     if (!driver) throw FileDamage{"has a damaged driver"};
     Level level;
     level.vertices = std::move(driver->vertices);
@@ -169,10 +169,6 @@ std::vector<FileLevel> levels_of(const CodedMesh& coded, const Mesh& mesh, const
 
 Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, const MeshCodeOptions& options,
                               const RunContext& context) {
-    const auto* detail = std::get_if<BlendDetail>(&model.detail);
-    if (!detail)
-        return Error{ErrorCode::unsuitable,
-                     "The model has the reference code, which is not packed; strip the mesh with the blend code."};
     const bool elsewhere = model.driver_is_behind;
     if (elsewhere && options.levels)
         return Error{ErrorCode::unsuitable, "The model was stripped to a driver made elsewhere, and streams need one "
@@ -203,7 +199,7 @@ Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, con
                   .bits = options.bits,
                   .surface = options.surface,
                   .keep_order = options.keep_order,
-                  .precision = static_cast<std::uint32_t>(detail->precision),
+                  .precision = static_cast<std::uint32_t>(model.detail.precision),
                   .driver_vertices = driver.vertices.size(),
                   .driver_faces = driver.face_count(),
                   .driver_corners = driver.corners.size()};
@@ -301,7 +297,7 @@ PoseSequence read_clips(const SectionReader& in) {
     const std::size_t most_frames = most_clip_frames(driver.vertices.size() * clip.numbers);
     for (std::uint32_t k = 0; poses.frames.size() < clip.frames; ++k) {
         const std::optional<ClipFrames> frames =
-            decode_clip(stream_of(in, "cd.clip", k), clip.numbers, order, most_frames);
+            decode_clip(frames_of(in, "cd.clip", k), clip.numbers, order, most_frames);
         if (!frames || frames->size() < 2 || poses.frames.size() + frames->size() - 1 > clip.frames) throw damage;
         for (std::size_t f = 1; f < frames->size(); ++f) {
             Pose& pose = poses.frames.emplace_back();
@@ -356,15 +352,15 @@ CodedLevels read_levels(const SectionReader& in) {
     if (table.size() > 64) throw FileDamage{"has more levels than make sense"};
     levels.vertices = table[0].vertices;
     levels.triangles = table[0].triangles;
-    levels.connectivity = stream_of(in, "cd.bcon");
-    levels.places = stream_of(in, "cd.bpos");
-    levels.attributes = stream_of(in, "cd.batt");
+    levels.connectivity = frames_of(in, "cd.bcon");
+    levels.places = frames_of(in, "cd.bpos");
+    levels.attributes = frames_of(in, "cd.batt");
     for (std::uint32_t k = 1; k < table.size() && table[k].batches > 0; ++k)
         levels.levels.push_back({.batches = table[k].batches,
                                  .vertices = table[k].vertices,
                                  .triangles = table[k].triangles,
-                                 .splits = stream_of(in, "cd.lev", k),
-                                 .refinement = stream_of(in, "cd.ref", k)});
+                                 .splits = frames_of(in, "cd.lev", k),
+                                 .refinement = frames_of(in, "cd.ref", k)});
     return levels;
 }
 
@@ -372,10 +368,10 @@ Model read_model_code(const SectionReader& in, Mesh rest, const RunContext& cont
     const FileCode code = read_file_code(in);
     in.require_room(unpacked_bytes(code) + double(rest.scalars.size()) * double(code.vertices) * sizeof(float));
     CodedMesh coded = coded_outline(in, code);
-    coded.connectivity = stream_of(in, "cd.con");
-    coded.places = stream_of(in, "cd.pos");
-    coded.attributes = stream_of(in, "cd.att");
-    coded.order = stream_of(in, "cd.ord");
+    coded.connectivity = frames_of(in, "cd.con");
+    coded.places = frames_of(in, "cd.pos");
+    coded.attributes = frames_of(in, "cd.att");
+    coded.order = frames_of(in, "cd.ord");
     coded.levels = read_levels(in);
     coded.rest = std::move(rest);
     Result<Mesh> mesh = decode_mesh(coded, context);

@@ -1,5 +1,6 @@
 #include "filigree/io/model_file.h"
 
+#include "filigree/io/mesh_sections.h"
 #include "filigree/io/model_code.h"
 #include "filigree/io/model_records.h"
 #include "filigree/io/model_sections.h"
@@ -8,104 +9,10 @@
 
 #include <cmath>
 #include <new>
-#include <stdexcept>
 
 namespace filigree {
 
 namespace {
-
-template <class T>
-void write_attribute(SectionWriter& out, const std::string& name, const CornerAttribute<T>& attribute) {
-    out.array(name + ".val", attribute.values);
-    out.array(name + ".cor", attribute.corners);
-}
-
-void write_labels(SectionWriter& out, const std::string& name, const FaceLabels& labels) {
-    out.strings(name + ".nam", labels.names);
-    out.array(name + ".fac", labels.of_face);
-}
-
-/// Faces as one size when all have it, else as their offsets.
-void write_faces(SectionWriter& out, const std::string& name, std::uint32_t index, const std::vector<Index>& offsets,
-                 const std::vector<Index>& corners) {
-    const Index size = offsets.size() > 1 ? offsets[1] : 0;
-    bool uniform = size > 0;
-    for (std::size_t f = 0; uniform && f < offsets.size(); ++f) uniform = offsets[f] == f * size;
-    if (uniform)
-        out.array(name + ".siz", std::vector<Index>{size}, index);
-    else
-        out.array(name + ".off", offsets, index);
-    out.array(name + ".cor", corners, index);
-}
-
-/// An embedded material; its name stands in mat.nam.
-struct FileMaterial {
-    std::array<float, 3> color;
-    float opacity, metallic, roughness;
-    std::uint32_t double_sided;
-    std::uint32_t picture; ///< index of a mat.pic, or kNoIndex
-};
-static_assert(sizeof(FileMaterial) == 32);
-
-/// Each once, in the order in which materials have them.
-std::vector<const std::string*> pictures_of(const std::vector<MeshMaterial>& materials) {
-    std::vector<const std::string*> pictures;
-    for (const MeshMaterial& m : materials)
-        if (m.picture_bytes && !m.picture_bytes->empty() &&
-            std::find(pictures.begin(), pictures.end(), m.picture_bytes.get()) == pictures.end())
-            pictures.push_back(m.picture_bytes.get());
-    return pictures;
-}
-
-void write_material_sections(SectionWriter& out, const std::vector<MeshMaterial>& materials) {
-    std::vector<FileMaterial> records;
-    const std::vector<const std::string*> pictures = pictures_of(materials);
-    for (const MeshMaterial& m : materials) {
-        const auto found = std::find(pictures.begin(), pictures.end(), m.picture_bytes.get());
-        const std::uint32_t picture =
-            found == pictures.end() ? kNoIndex : static_cast<std::uint32_t>(found - pictures.begin());
-        records.push_back({{m.color[0], m.color[1], m.color[2]},
-                           m.opacity,
-                           m.metallic,
-                           m.roughness,
-                           m.double_sided ? 1u : 0u,
-                           picture});
-    }
-    out.array("mat.emb", std::move(records));
-}
-
-void write_pictures(SectionWriter& out, const std::vector<MeshMaterial>& materials) {
-    const std::vector<const std::string*> pictures = pictures_of(materials);
-    for (std::uint32_t i = 0; i < pictures.size(); ++i) out.bytes("mat.pic", *pictures[i], i);
-}
-
-void write_mesh_sections(SectionWriter& out, const Mesh& mesh, bool with_positions, bool with_pictures = true) {
-    if (with_positions)
-        for (std::uint32_t k = 0; k < chunk_count(mesh.vertex_count()); ++k) {
-            const std::size_t begin = k * kChunkVertices, count = std::min(kChunkVertices, mesh.vertex_count() - begin);
-            out.items("mesh.pos", std::span(mesh.positions).subspan(begin, count), k);
-        }
-    out.value("mesh.org", std::array<double, 3>{mesh.origin[0], mesh.origin[1], mesh.origin[2]});
-    out.value("mesh.num", static_cast<std::uint64_t>(mesh.vertex_count()));
-    write_faces(out, "mesh", 0, mesh.face_offsets, mesh.corners);
-    write_attribute(out, "uv", mesh.uvs);
-    write_attribute(out, "nrm", mesh.normals);
-    out.array("col.val", mesh.colors);
-    if (mesh.colors_have_alpha) out.value("col.alp", std::uint32_t{1});
-    std::vector<std::string> names;
-    for (std::uint32_t i = 0; i < mesh.scalars.size(); ++i) {
-        names.push_back(mesh.scalars[i].name);
-        out.array("scal.val", mesh.scalars[i].values, i);
-    }
-    out.strings("scal.nam", names);
-    write_labels(out, "obj", mesh.objects);
-    write_labels(out, "grp", mesh.groups);
-    write_labels(out, "mat", mesh.materials);
-    write_material_sections(out, mesh.embedded_materials);
-    if (with_pictures) write_pictures(out, mesh.embedded_materials);
-    out.array("smooth", mesh.smoothing);
-    out.strings("mtllib", mesh.material_files);
-}
 
 void write_blend(SectionWriter& out, const Model& model, const BlendDetail& detail) {
     out.value("bl.prec", static_cast<std::uint32_t>(detail.precision));
@@ -121,16 +28,6 @@ void write_blend(SectionWriter& out, const Model& model, const BlendDetail& deta
     }
     out.array("bl.gap", detail.across_gap);
     out.array("bl.away", detail.facing_away);
-}
-
-void write_reference(SectionWriter& out, const ReferenceDetail& detail) {
-    out.value("rf.par", std::array<std::uint32_t, 2>{detail.patches.levels, detail.references});
-    out.value("rf.ext", detail.extent);
-    out.array("rf.base", detail.patches.base);
-    out.array("rf.grid", detail.patches.grid);
-    out.array("rf.drv", detail.rest_driver);
-    out.array("rf.rec", detail.records);
-    out.array("rf.loose", detail.loose);
 }
 
 using FileGradient = std::array<float, 9>; // row-major
@@ -161,7 +58,6 @@ std::string check_poses(const PoseSequence& poses, std::size_t driver_vertices) 
         if (pose.gradients.empty() != poses.frames[0].gradients.empty() ||
             (!pose.gradients.empty() && pose.gradients.size() != driver_vertices))
             return name + " does not have the gradients that the others have";
-        if (!pose.ghosts.empty()) return name + " has ghost points, which files do not hold";
         const auto is_finite = [](const auto& value) { return value.allFinite(); };
         if (!std::all_of(pose.positions.begin(), pose.positions.end(), is_finite) ||
             !std::all_of(pose.gradients.begin(), pose.gradients.end(), is_finite))
@@ -170,53 +66,8 @@ std::string check_poses(const PoseSequence& poses, std::size_t driver_vertices) 
     return "";
 }
 
-template <class T>
-CornerAttribute<T> read_attribute(const SectionReader& in, const std::string& name) {
-    return {in.array<T>(name + ".val"), in.array<Index>(name + ".cor")};
-}
-
-FaceLabels read_labels(const SectionReader& in, const std::string& name) {
-    return {in.strings(name + ".nam"), in.array<Index>(name + ".fac")};
-}
-
-void read_faces(const SectionReader& in, const std::string& name, std::uint32_t index, std::vector<Index>& offsets,
-                std::vector<Index>& corners) {
-    corners = in.array<Index>(name + ".cor", index);
-    const std::vector<Index> size = in.array<Index>(name + ".siz", index);
-    if (size.empty()) {
-        offsets = in.array<Index>(name + ".off", index);
-        if (offsets.empty()) offsets = {0};
-        return;
-    }
-    if (size.size() != 1 || size[0] == 0 || corners.size() % size[0] != 0)
-        throw FileDamage{"has faces that do not divide their corners"};
-    offsets.resize(corners.size() / size[0] + 1);
-    for (std::size_t f = 0; f < offsets.size(); ++f) offsets[f] = static_cast<Index>(f * size[0]);
-}
-
 /// Whether the mesh's last vertices are those of a driver that was made elsewhere (of a file that is not coded).
 bool has_driver_behind(const SectionReader& in) { return !in.array<std::uint32_t>("mesh.drv").empty(); }
-
-Mesh read_mesh_sections(const SectionReader& in) {
-    Mesh mesh;
-    mesh.positions = in.all<Vec3f>("mesh.pos");
-    const auto origin = in.value<std::array<double, 3>>("mesh.org");
-    mesh.origin = {origin[0], origin[1], origin[2]};
-    read_faces(in, "mesh", 0, mesh.face_offsets, mesh.corners);
-    mesh.uvs = read_attribute<Vec2f>(in, "uv");
-    mesh.normals = read_attribute<Vec3f>(in, "nrm");
-    mesh.colors = in.array<Vec4f>("col.val");
-    mesh.colors_have_alpha = !in.array<std::uint32_t>("col.alp").empty();
-    const std::vector<std::string> names = in.strings("scal.nam");
-    for (std::uint32_t i = 0; i < names.size(); ++i) mesh.scalars.push_back({names[i], in.array<float>("scal.val", i)});
-    mesh.objects = read_labels(in, "obj");
-    mesh.groups = read_labels(in, "grp");
-    mesh.materials = read_labels(in, "mat");
-    mesh.embedded_materials = read_embedded_materials(in, mesh.materials.names, true);
-    mesh.smoothing = in.array<Index>("smooth");
-    mesh.material_files = in.strings("mtllib");
-    return mesh;
-}
 
 BlendDetail read_blend(const SectionReader& in) {
     BlendDetail detail;
@@ -225,41 +76,12 @@ BlendDetail read_blend(const SectionReader& in) {
     detail.precision = static_cast<Precision>(precision);
     detail.cells = in.array<Triangle>("bl.cell");
     if (detail.precision == Precision::int16) detail.cell_scales = in.array<float>("bl.scale");
-    if (in.version() == 1) {
-        detail.cell_offsets = in.array<Index>("bl.coff");
-        detail.order = in.array<Index>("bl.order");
-        if (detail.precision == Precision::float32) {
-            detail.u = in.array<float>("bl.u");
-            detail.v = in.array<float>("bl.v");
-        } else {
-            for (std::int16_t step : in.array<std::int16_t>("bl.u16"))
-                detail.u.push_back(float(step) * (1.0f / 32767.0f));
-            for (std::int16_t step : in.array<std::int16_t>("bl.v16"))
-                detail.v.push_back(float(step) * (1.0f / 32767.0f));
-            detail.offsets = in.array<std::array<std::int16_t, 3>>("bl.off16");
-        }
-    } else {
-        const auto vertices = in.value<std::uint64_t>("mesh.num");
-        if (vertices >= kNoIndex || chunk_count(vertices) != in.count("bl.run").first)
-            throw FileDamage{"is inconsistent: there are not as many chunks as its vertices fill"};
-        read_chunk_records(in, 0, chunk_count(vertices), vertices, 0, detail);
-    }
+    const auto vertices = in.value<std::uint64_t>("mesh.num");
+    if (vertices >= kNoIndex || chunk_count(vertices) != in.count("bl.run").first)
+        throw FileDamage{"is inconsistent: there are not as many chunks as its vertices fill"};
+    read_chunk_records(in, 0, chunk_count(vertices), vertices, 0, detail);
     detail.across_gap = in.array<Index>("bl.gap");
     detail.facing_away = in.array<Index>("bl.away");
-    return detail;
-}
-
-ReferenceDetail read_reference(const SectionReader& in) {
-    ReferenceDetail detail;
-    const auto parameters = in.value<std::array<std::uint32_t, 2>>("rf.par");
-    detail.patches.levels = parameters[0];
-    detail.references = parameters[1];
-    detail.extent = in.value<float>("rf.ext");
-    detail.patches.base = in.array<std::array<Index, 4>>("rf.base");
-    detail.patches.grid = in.array<Index>("rf.grid");
-    detail.rest_driver = in.array<Vec3f>("rf.drv");
-    detail.records = in.array<Vec3f>("rf.rec");
-    detail.loose = in.array<Index>("rf.loose");
     return detail;
 }
 
@@ -294,7 +116,7 @@ PoseSequence read_pose_sections(const FileReader& file) {
     return poses;
 }
 
-Model read_sections(const FileReader& file, const RunContext& context) {
+Model read_sections(const FileReader& file, const std::string& name, const RunContext& context) {
     const SectionReader in(file);
     if (is_coded(in)) {
         Model model = read_model_code(in, read_mesh_sections(in), context);
@@ -302,23 +124,15 @@ Model read_sections(const FileReader& file, const RunContext& context) {
         if (const std::string wrong = check_model(model); !wrong.empty()) throw FileDamage{"is inconsistent: " + wrong};
         return model;
     }
+    if (has_reference_code(in))
+        throw Error{ErrorCode::unsuitable, name + ": has the report's reference code, which this cannot work with; "
+                                                  "strip its mesh with the blend code."};
     Model model;
     model.mesh = read_mesh_sections(in);
     model.source_order = in.array<Index>("mesh.ord");
     model.driver_is_behind = has_driver_behind(in);
-    const auto level_count = in.value<std::uint32_t>("levels");
-    if (level_count > 64) throw FileDamage{"has more levels than make sense"};
-    for (std::uint32_t k = 0; k < level_count; ++k) {
-        Level& level = model.levels.emplace_back();
-        level.vertices = in.array<Index>("lev.vert", k);
-        read_faces(in, "lev", k, level.face_offsets, level.corners);
-    }
-    const auto code = in.value<std::uint32_t>("code");
-    if (code > 1) throw FileDamage{"has a detail code that is not known"};
-    if (static_cast<DetailCode>(code) == DetailCode::reference)
-        model.detail = read_reference(in);
-    else
-        model.detail = read_blend(in);
+    model.levels = read_level_sections(in);
+    model.detail = read_blend(in);
 
     // Float models hold every position. int16 models hold the driver's positions alone; the others come from the
     // records, once those are known to be sound.
@@ -327,15 +141,14 @@ Model read_sections(const FileReader& file, const RunContext& context) {
     if (driver.empty() && vertex_count != model.mesh.vertex_count())
         throw FileDamage{"does not have as many positions as it says"};
     if (!driver.empty()) {
-        auto* detail = std::get_if<BlendDetail>(&model.detail);
-        if (!detail || vertex_count != detail->order.size() || model.levels.empty() ||
-            driver.size() != model.driver().vertices.size() || detail->precision != Precision::int16)
+        if (vertex_count != model.detail.order.size() || model.levels.empty() ||
+            driver.size() != model.driver().vertices.size() || model.detail.precision != Precision::int16)
             throw FileDamage{"has records that do not fit its vertices"};
         model.mesh.positions.assign(vertex_count, Vec3f::Zero());
         for (std::size_t i = 0; i < driver.size(); ++i)
             if (model.driver().vertices[i] < vertex_count) model.mesh.positions[model.driver().vertices[i]] = driver[i];
         if (const std::string wrong = check_model(model); !wrong.empty()) throw FileDamage{"is inconsistent: " + wrong};
-        decode_rest(*detail, model.driver().vertices, model.mesh.positions);
+        decode_rest(model.detail, model.driver().vertices, model.mesh.positions);
     }
     if (const std::string wrong = check_model(model); !wrong.empty()) throw FileDamage{"is inconsistent: " + wrong};
     return model;
@@ -366,9 +179,9 @@ CodedBytes lossless_parts(const std::vector<std::pair<std::string, std::uint64_t
             parts.order += bytes;
         else if (is_one_of({"mesh."}))
             parts.places += bytes;
-        else if (is_one_of({"lev", "drv.", "rf.drv", "bl.cell"}))
+        else if (is_one_of({"lev", "drv.", "bl.cell"}))
             parts.driver += bytes;
-        else if (is_one_of({"bl.", "ck.", "rf.", "code"}))
+        else if (is_one_of({"bl.", "ck.", "code"}))
             parts.records += bytes;
         else if (is_one_of({"pose."}))
             parts.clips += bytes;
@@ -408,8 +221,7 @@ ModelOutline read_outline_sections(const FileReader& file) {
                         behind = outline.driver_is_behind ? outline.levels[0].vertices : 0;
     if (behind > all) throw FileDamage{"is inconsistent: its driver has more vertices than there are"};
     outline.levels.push_back({all - behind, faces("mesh", 0), in.item_count<Index>("mesh.cor")});
-    if (in.value<std::uint32_t>("code") == static_cast<std::uint32_t>(DetailCode::reference)) {
-        outline.code = DetailCode::reference;
+    if (has_reference_code(in)) {
         outline.references = in.value<std::array<std::uint32_t, 2>>("rf.par")[1];
         outline.patches = in.item_count<std::array<Index, 4>>("rf.base");
     } else {
@@ -426,7 +238,6 @@ ModelOutline read_outline_sections(const FileReader& file) {
 
 /// The positions of some vertices, ascending.
 std::vector<Vec3f> positions_of(const SectionReader& in, std::span<const Index> vertices) {
-    if (in.version() == 1) return in.chosen<Vec3f>("mesh.pos", vertices);
     std::vector<Vec3f> positions;
     std::vector<Index> in_chunk;
     for (std::size_t begin = 0, end = 0; begin < vertices.size(); begin = end) {
@@ -441,14 +252,19 @@ std::vector<Vec3f> positions_of(const SectionReader& in, std::span<const Index> 
     return positions;
 }
 
-Mesh read_level_sections(const FileReader& file, unsigned k, const RunContext& context) {
+Mesh read_one_level(const FileReader& file, unsigned k, const std::string& name, const RunContext& context) {
     const SectionReader in(file);
     const std::uint32_t level_count = is_coded(in) ? 1 : in.value<std::uint32_t>("levels");
     if (k > level_count)
         throw Error{ErrorCode::usage, "The model has levels 0 to " + std::to_string(level_count) +
                                           "; there is no level " + std::to_string(k) + "."};
-    const bool positions_are_coded = in.count("mesh.pos").first == 0;
-    if (k == level_count || positions_are_coded) return level_mesh(read_sections(file, context), k);
+    const bool is_reference = !is_coded(in) && has_reference_code(in), has_positions = in.count("mesh.pos").first > 0;
+    if (!is_reference && (k == level_count || !has_positions)) return level_mesh(read_sections(file, name, context), k);
+    if (k == level_count) {
+        Mesh finest = read_mesh_sections(in);
+        if (const std::string wrong = check_mesh(finest); !wrong.empty()) throw FileDamage{"is inconsistent: " + wrong};
+        return finest;
+    }
     const std::vector<Index> vertices = in.array<Index>("lev.vert", k);
     if (!std::is_sorted(vertices.begin(), vertices.end()))
         throw FileDamage{"is inconsistent: a level's vertices do not ascend"};
@@ -457,7 +273,7 @@ Mesh read_level_sections(const FileReader& file, unsigned k, const RunContext& c
     mesh.origin = {origin[0], origin[1], origin[2]};
     read_faces(in, "lev", k, mesh.face_offsets, mesh.corners);
     mesh.positions = positions_of(in, vertices);
-    const auto per_vertex = [&](const std::string& name) { return in.item_count<Index>(name + ".cor") == 0; };
+    const auto per_vertex = [&](const std::string& section) { return in.item_count<Index>(section + ".cor") == 0; };
     if (per_vertex("uv")) mesh.uvs.values = in.chosen<Vec2f>("uv.val", vertices);
     if (per_vertex("nrm")) mesh.normals.values = in.chosen<Vec3f>("nrm.val", vertices);
     mesh.colors = in.chosen<Vec4f>("col.val", vertices);
@@ -469,55 +285,7 @@ Mesh read_level_sections(const FileReader& file, unsigned k, const RunContext& c
     return mesh;
 }
 
-/// What `read` makes of a file; what it throws as an Error.
-template <class Read>
-auto guarded(const FileReader& file, const std::string& name, const RunContext& context, const Read& read)
-    -> Result<decltype(read(file))> {
-    if (context.is_cancelled()) return cancelled_error();
-    try {
-        if (!is_model_file(file))
-            return Error{ErrorCode::bad_file, name + " is not a Filigree model: strip a mesh to make one."};
-        return read(file);
-    } catch (const Error& error) {
-        return error;
-    } catch (const FileDamage& damage) {
-        return error_of(damage, name);
-    } catch (const std::bad_alloc&) {
-        return Error{ErrorCode::out_of_memory, name + " does not fit into memory."};
-    } catch (const std::length_error&) {
-        return Error{ErrorCode::out_of_memory, name + " does not fit into memory."};
-    }
-}
-
 } // namespace
-
-std::vector<MeshMaterial> read_embedded_materials(const SectionReader& in, const std::vector<std::string>& names,
-                                                  bool with_pictures) {
-    const std::vector<FileMaterial> records = in.array<FileMaterial>("mat.emb");
-    if (records.empty()) return {};
-    if (records.size() != names.size()) throw FileDamage{"has another number of materials than of their names"};
-    std::map<std::uint32_t, std::shared_ptr<const std::string>> pictures;
-    std::vector<MeshMaterial> materials;
-    for (std::size_t i = 0; i < records.size(); ++i) {
-        const FileMaterial& record = records[i];
-        MeshMaterial& material = materials.emplace_back();
-        material.name = names[i];
-        material.color = {record.color[0], record.color[1], record.color[2]};
-        material.opacity = record.opacity;
-        material.metallic = record.metallic;
-        material.roughness = record.roughness;
-        material.double_sided = record.double_sided != 0;
-        if (record.picture == kNoIndex || !with_pictures) continue;
-        std::shared_ptr<const std::string>& picture = pictures[record.picture];
-        if (!picture) {
-            const std::vector<char> bytes = in.array<char>("mat.pic", record.picture);
-            if (bytes.empty()) throw FileDamage{"lacks the picture of a material"};
-            picture = std::make_shared<const std::string>(bytes.begin(), bytes.end());
-        }
-        material.picture_bytes = picture;
-    }
-    return materials;
-}
 
 bool is_model_file(std::string_view bytes) {
     return bytes.starts_with(std::string_view(kModelMagic, sizeof kModelMagic));
@@ -531,20 +299,12 @@ bool is_model_file(const FileReader& file) {
 namespace {
 
 void write_sections(SectionWriter& out, const Model& model, const PoseSequence& poses) {
-    const auto* blend = std::get_if<BlendDetail>(&model.detail);
-    write_mesh_sections(out, model.mesh, !blend || blend->precision == Precision::float32);
+    write_mesh_sections(out, model.mesh, model.detail.precision == Precision::float32);
     out.array("mesh.ord", model.source_order);
     if (model.driver_is_behind) out.value("mesh.drv", std::uint32_t{1});
-    out.value("code", static_cast<std::uint32_t>(model.code()));
-    out.value("levels", static_cast<std::uint32_t>(model.levels.size()));
-    for (std::uint32_t k = 0; k < model.levels.size(); ++k) {
-        out.array("lev.vert", model.levels[k].vertices, k);
-        write_faces(out, "lev", k, model.levels[k].face_offsets, model.levels[k].corners);
-    }
-    if (blend)
-        write_blend(out, model, *blend);
-    else
-        write_reference(out, std::get<ReferenceDetail>(model.detail));
+    out.value("code", kBlendCode);
+    write_level_sections(out, model.levels);
+    write_blend(out, model, model.detail);
     write_poses(out, poses);
 }
 
@@ -665,7 +425,7 @@ Status write_model(const Model& model, const std::filesystem::path& path, const 
 Result<Model> read_model(const FileReader& file, const std::string& name, const RunContext& context) {
     context.report("read", 0);
     Result<Model> model =
-        guarded(file, name, context, [&](const FileReader& from) { return read_sections(from, context); });
+        read_guarded(file, name, context, [&](const FileReader& from) { return read_sections(from, name, context); });
     context.report("read", 1);
     return model;
 }
@@ -681,7 +441,7 @@ Result<Model> read_model(const std::filesystem::path& path, const RunContext& co
 }
 
 Result<PoseSequence> read_poses(const FileReader& file, const std::string& name, const RunContext& context) {
-    return guarded(file, name, context, read_pose_sections);
+    return read_guarded(file, name, context, read_pose_sections);
 }
 
 Result<PoseSequence> read_poses(std::string_view bytes, const std::string& name, const RunContext& context) {
@@ -695,13 +455,13 @@ Result<PoseSequence> read_poses(const std::filesystem::path& path, const RunCont
 }
 
 Result<ModelOutline> read_model_outline(const FileReader& file, const std::string& name, const RunContext& context) {
-    return guarded(file, name, context, read_outline_sections);
+    return read_guarded(file, name, context, read_outline_sections);
 }
 
 Result<Mesh> read_model_level(const FileReader& file, unsigned level, const std::string& name,
                               const RunContext& context) {
-    return guarded(file, name, context,
-                   [&](const FileReader& from) { return read_level_sections(from, level, context); });
+    return read_guarded(file, name, context,
+                        [&](const FileReader& from) { return read_one_level(from, level, name, context); });
 }
 
 } // namespace filigree

@@ -19,8 +19,8 @@ bool is_model_file(const FileReader& file);
 
 /// Reads a model; "-" is standard input. Nothing in the file is trusted: sizes are held against the file's length
 /// before anything is allocated (packed parts may come to 1,024 times its bytes, or 256 MiB), every section has a
-/// checksum, and what comes back passes check_model. Errors: not_found, bad_file (truncated, damaged, of a later
-/// version, not a model), out_of_memory, cancelled.
+/// checksum, and what comes back passes check_model. Errors: not_found, bad_file (truncated, damaged, of another
+/// version, not a model), unsuitable (the reference code, see io/reference_file.h), out_of_memory, cancelled.
 Result<Model> read_model(const std::filesystem::path& path, const RunContext& context);
 /// The same from a file that is open, or from bytes in memory; `name` stands in messages.
 Result<Model> read_model(const FileReader& file, const std::string& name, const RunContext& context);
@@ -48,13 +48,12 @@ struct Coding {
 
 /// What a model file says of its model.
 struct ModelOutline {
-    DetailCode code = DetailCode::blend;
     std::vector<LevelCounts> levels; ///< coarse to fine, with the finest
     bool driver_is_behind = false;   ///< see Model; of a coded file false
     Precision precision = Precision::float32;
-    std::vector<Index> across_gap, facing_away; ///< blend code, as in BlendDetail
-    unsigned references = 0;                    ///< reference code
-    std::size_t patches = 0;                    ///< reference code
+    std::vector<Index> across_gap, facing_away; ///< as in BlendDetail
+    unsigned references = 0;                    ///< 3, 4 or 6: a file of the reference code (io/reference_file.h)
+    std::size_t patches = 0;                    ///< of the reference code
     std::size_t frames = 0;                     ///< poses
     double frames_per_second = 0;
     bool has_gradients = false;              ///< in the poses
@@ -84,7 +83,7 @@ Status write_model(const Model& model, const std::filesystem::path& path, const 
 std::string write_model(const Model& model);
 
 /// The same with poses of its driver. Errors: mismatch as well (a pose of another number of vertices, gradients in some
-/// frames alone, ghosts, numbers or a rate that are not finite and the rate above 0), which is found before anything is
+/// frames alone, numbers or a rate that are not finite and the rate above 0), which is found before anything is
 /// written. No frames: the file of the model alone.
 Status write_model(const Model& model, const PoseSequence& poses, const std::filesystem::path& path,
                    const RunContext& context);
@@ -101,8 +100,8 @@ struct CodingReport {
 /// Writes a model in few bits (docs/coding.md): its mesh rounded and in an order of the code's own, its driver with the
 /// same vertices in the same order, so that poses fit as before. Poses are coded too: 1e-5 of the diagonal off (rms),
 /// gradients a thousandth. Levels between are dropped; vertices are bound to the
-/// driver anew when the file is read. Errors: as write_model, and as encode_mesh; unsuitable (the reference code;
-/// streams of a driver made elsewhere).
+/// driver anew when the file is read. Errors: as write_model, and as encode_mesh; unsuitable (streams of a driver made
+/// elsewhere).
 Result<CodingReport> write_coded_model(const Model& model, const PoseSequence& poses, const MeshCodeOptions& options,
                                        const std::filesystem::path& path, const RunContext& context);
 struct LosslessReport {

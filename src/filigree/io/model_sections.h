@@ -26,7 +26,7 @@ namespace filigree {
 static_assert(std::endian::native == std::endian::little, "model files are written as the processor keeps them");
 
 inline constexpr char kModelMagic[8] = {'F', 'I', 'L', 'I', 'G', 'R', 'E', 'E'};
-inline constexpr std::uint32_t kModelVersion = 2, kOldestModelVersion = 1;
+inline constexpr std::uint32_t kModelVersion = 2;
 
 struct ModelHeader {
     char magic[8];
@@ -159,11 +159,10 @@ public:
         ModelHeader header;
         if (file.size() < sizeof header) throw FileDamage{"is cut off in its header"};
         read(0, std::span(&header, 1));
-        if (header.version < kOldestModelVersion || header.version > kModelVersion)
-            throw FileDamage{"is of version " + std::to_string(header.version) + " and this program reads versions " +
-                                 std::to_string(kOldestModelVersion) + " to " + std::to_string(kModelVersion),
+        if (header.version != kModelVersion)
+            throw FileDamage{"is of version " + std::to_string(header.version) + " and this program reads version " +
+                                 std::to_string(kModelVersion),
                              "use a newer program, or strip the mesh again"};
-        version_ = header.version;
         if (header.file_size != file.size())
             throw FileDamage{"should have " + std::to_string(header.file_size) + " bytes and has " +
                              std::to_string(file.size()) + ": it was cut off or added to"};
@@ -188,8 +187,6 @@ public:
     }
     SectionReader(const SectionReader&) = delete;
     SectionReader& operator=(const SectionReader&) = delete;
-
-    std::uint32_t version() const { return version_; }
 
     /// Refuses a file whose parts would come to so many bytes; see most_unpacked.
     void require_room(double bytes) const {
@@ -381,13 +378,8 @@ private:
     }
 
     const FileReader& file_;
-    std::uint32_t version_ = 0;
     std::map<Key, FileSection> sections_; ///< of equals the first
     std::unique_ptr<Lossless> lossless_;  ///< of a lossless file, whose plain sections these are
 };
-
-/// The materials inside a file; pictures can be left out, as where they have not come yet. Throws FileDamage.
-std::vector<MeshMaterial> read_embedded_materials(const SectionReader& in, const std::vector<std::string>& names,
-                                                  bool with_pictures);
 
 } // namespace filigree

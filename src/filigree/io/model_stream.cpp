@@ -2,6 +2,7 @@
 
 #include "filigree/coding/face_code.h"
 #include "filigree/coding/mesh_levels.h"
+#include "filigree/io/mesh_sections.h"
 #include "filigree/io/model_code.h"
 
 #include <algorithm>

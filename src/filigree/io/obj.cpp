@@ -1,5 +1,5 @@
 // Wavefront OBJ, polygons only.
-#include "filigree/io/large_memory.h"
+#include "filigree/core/large_memory.h"
 #include "filigree/io/material_file.h"
 #include "filigree/io/mesh_formats.h"
 #include "filigree/io/text_scanner.h"

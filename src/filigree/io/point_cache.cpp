@@ -28,8 +28,8 @@ void take_origin_off(std::span<Vec3f> positions, const Vec3d& origin) {
     for (Vec3f& p : positions) p = (p.cast<double>() - origin).cast<float>();
 }
 
-Result<PoseStream> open_own_poses(const fs::path& path, std::size_t points, const PoseFileOptions& options,
-                                  const RunContext& context) {
+Result<FrameSource<Pose>> open_own_poses(const fs::path& path, std::size_t points, const PoseFileOptions& options,
+                                         const RunContext& context) {
     Result<PoseSequence> poses = read_poses(path, context);
     if (!poses) return poses.error();
     if (poses->empty())
@@ -40,14 +40,14 @@ Result<PoseStream> open_own_poses(const fs::path& path, std::size_t points, cons
                      path.string() + ": its poses have " + std::to_string(poses->frames[0].positions.size()) +
                          " vertices and the driver has " + std::to_string(points) + "; they are of another model."};
     const auto kept = std::make_shared<PoseSequence>(std::move(*poses));
-    return PoseStream{kept->frames.size(), options.frames_per_second.value_or(kept->frames_per_second),
-                      [kept](std::size_t frame) -> Result<Pose> { return kept->frames[frame]; }};
+    return FrameSource<Pose>{kept->frames.size(), options.frames_per_second.value_or(kept->frames_per_second),
+                             [kept](std::size_t frame) -> Result<Pose> { return kept->frames[frame]; }};
 }
 
 /// Positions of a stream's poses alone.
-MeshAnimation animation_of(PoseStream stream, const Mesh& rest) {
+MeshAnimation animation_of(FrameSource<Pose> stream, const Mesh& rest) {
     return {&rest, stream.frames, stream.frames_per_second,
-            [pose = std::move(stream.pose)](std::size_t frame, std::span<Vec3f> positions) -> Status {
+            [pose = std::move(stream.frame)](std::size_t frame, std::span<Vec3f> positions) -> Status {
                 const Result<Pose> moved = pose(frame);
                 if (!moved) return moved.error();
                 std::copy(moved->positions.begin(), moved->positions.end(), positions.begin());
@@ -57,8 +57,8 @@ MeshAnimation animation_of(PoseStream stream, const Mesh& rest) {
 
 bool is_cache(const std::string& extension) { return extension == ".pc2" || extension == ".mdd"; }
 
-Result<PointSource> open_cache(const fs::path& path, const std::string& extension, std::size_t points,
-                               const PoseFileOptions& options) {
+Result<MeshAnimation> open_cache(const fs::path& path, const std::string& extension, std::size_t points,
+                                 const PoseFileOptions& options) {
     return extension == ".pc2" ? open_pc2(path, points, options.frames_per_second)
                                : open_mdd(path, points, options.frames_per_second);
 }
@@ -95,6 +95,12 @@ Status CheckedFrames::fetch(std::size_t frame, std::span<Vec3f> positions) {
     return Success{};
 }
 
+MeshAnimation CheckedFrames::animation() {
+    MeshAnimation checked = animation_;
+    checked.positions = [this](std::size_t frame, std::span<Vec3f> positions) { return fetch(frame, positions); };
+    return checked;
+}
+
 void CheckedFrames::warn(std::vector<std::string>& warnings) const {
     constexpr double kUnseen = 1e-7; // of the diagonal: what 32 bits lose anyway
     const double diagonal = bounds(animation_.rest->positions).diagonal();
@@ -126,14 +132,14 @@ Result<AnimationFormat> animation_format(const fs::path& path) {
 namespace {
 
 /// As the file has them.
-Result<PoseStream> open_unturned(const fs::path& path, std::size_t points, const Vec3d& origin,
-                                 const PoseFileOptions& options, const RunContext& context) {
+Result<FrameSource<Pose>> open_unturned(const fs::path& path, std::size_t points, const Vec3d& origin,
+                                        const PoseFileOptions& options, const RunContext& context) {
     if (Status sound = check_rate(options); !sound) return sound.error();
     const std::string extension = lower_extension(path);
     if (is_cache(extension)) {
-        Result<PointSource> source = open_cache(path, extension, points, options);
+        Result<MeshAnimation> source = open_cache(path, extension, points, options);
         if (!source) return source.error();
-        return PoseStream{
+        return FrameSource<Pose>{
             source->frames, source->frames_per_second,
             [points, origin, positions = std::move(source->positions)](std::size_t frame) -> Result<Pose> {
                 Pose pose;
@@ -160,11 +166,11 @@ void turn_pose(Pose& pose, const Vec3d& origin, UpAxis up) {
 }
 
 /// Programs with another axis up save their drivers lying on their faces.
-Status warn_of_turn(const PoseStream& stream, const fs::path& path, const Vec3d& origin,
+Status warn_of_turn(const FrameSource<Pose>& stream, const fs::path& path, const Vec3d& origin,
                     const PoseFileOptions& options) {
     if (!options.warnings || options.rest.empty() || stream.frames == 0 || lower_extension(path) == ".fil")
         return Success{};
-    const Result<Pose> first = stream.pose(0);
+    const Result<Pose> first = stream.frame(0);
     if (!first) return first.error();
     if (const std::string turned = turned_first_frame(options.rest, first->positions, origin, path); !turned.empty())
         options.warnings->push_back(turned);
@@ -173,12 +179,12 @@ Status warn_of_turn(const PoseStream& stream, const fs::path& path, const Vec3d&
 
 } // namespace
 
-Result<PoseStream> open_poses(const fs::path& path, std::size_t points, const Vec3d& origin,
-                              const PoseFileOptions& options, const RunContext& context) {
-    Result<PoseStream> stream = open_unturned(path, points, origin, options, context);
+Result<FrameSource<Pose>> open_poses(const fs::path& path, std::size_t points, const Vec3d& origin,
+                                     const PoseFileOptions& options, const RunContext& context) {
+    Result<FrameSource<Pose>> stream = open_unturned(path, points, origin, options, context);
     if (!stream) return stream;
     if (options.up)
-        stream->pose = [pose = std::move(stream->pose), origin, up = *options.up](std::size_t frame) -> Result<Pose> {
+        stream->frame = [pose = std::move(stream->frame), origin, up = *options.up](std::size_t frame) -> Result<Pose> {
             Result<Pose> read = pose(frame);
             if (read) turn_pose(*read, origin, up);
             return read;
@@ -192,17 +198,18 @@ Result<MeshAnimation> open_animation(const fs::path& path, const Mesh& rest, con
     if (Status sound = check_rate(options); !sound) return sound.error();
     const std::string extension = lower_extension(path);
     if (is_cache(extension) && !options.up && !options.warnings) { // without a pose between
-        Result<PointSource> source = open_cache(path, extension, rest.vertex_count(), options);
+        Result<MeshAnimation> source = open_cache(path, extension, rest.vertex_count(), options);
         if (!source) return source.error();
-        return MeshAnimation{
-            &rest, source->frames, source->frames_per_second,
-            [&rest, read = std::move(source->positions)](std::size_t frame, std::span<Vec3f> positions) -> Status {
-                if (Status done = read(frame, positions); !done) return done;
-                take_origin_off(positions, rest.origin);
-                return Success{};
-            }};
+        source->rest = &rest;
+        source->positions = [&rest, read = std::move(source->positions)](std::size_t frame,
+                                                                         std::span<Vec3f> positions) -> Status {
+            if (Status done = read(frame, positions); !done) return done;
+            take_origin_off(positions, rest.origin);
+            return Success{};
+        };
+        return source;
     }
-    Result<PoseStream> stream = open_poses(path, rest.vertex_count(), rest.origin, options, context);
+    Result<FrameSource<Pose>> stream = open_poses(path, rest.vertex_count(), rest.origin, options, context);
     if (!stream) return stream.error();
     return animation_of(std::move(*stream), rest);
 }
@@ -216,17 +223,16 @@ Result<std::vector<std::string>> write_animation(const MeshAnimation& animation,
     std::vector<std::string> warnings;
     const bool holds_origin = *format == AnimationFormat::usda;
     CheckedFrames frames(animation, path, holds_origin ? Vec3d::Zero() : animation.rest->origin);
-    const FramePositions positions = [&](std::size_t frame, std::span<Vec3f> out) { return frames.fetch(frame, out); };
     Status written = Success{};
     switch (*format) {
     case AnimationFormat::pc2:
-        written = write_pc2(animation, positions, path, context);
+        written = write_pc2(frames.animation(), path, context);
         break;
     case AnimationFormat::mdd:
-        written = write_mdd(animation, positions, path, context);
+        written = write_mdd(frames.animation(), path, context);
         break;
     case AnimationFormat::usda:
-        written = write_usda(animation, positions, path, warnings, context);
+        written = write_usda(frames.animation(), path, warnings, context);
         break;
     case AnimationFormat::glb: {
         Result<ExportReport> report = write_morph_glb(animation, {}, path, context);
@@ -235,8 +241,9 @@ Result<std::vector<std::string>> write_animation(const MeshAnimation& animation,
         break;
     }
     case AnimationFormat::numbered:
-        return write_numbered_meshes(
-            animation.frames, [&](std::size_t frame) { return mesh_at(animation, frame, context); }, path, context);
+        return write_numbered_meshes({animation.frames, animation.frames_per_second,
+                                      [&](std::size_t frame) { return mesh_at(animation, frame, context); }},
+                                     path, context);
     }
     if (!written) return written.error();
     frames.warn(warnings);

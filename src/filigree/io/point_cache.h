@@ -55,8 +55,8 @@ struct PoseFileOptions {
 /// gradients as it has, which is found when they are fetched.
 /// points: the driver's vertices; origin: the mesh's. Errors: not_found, bad_file, mismatch (other number of points),
 /// unsupported (pipes too: frames are fetched in any order), usage (no such animation, several sequences in a folder).
-Result<PoseStream> open_poses(const std::filesystem::path& path, std::size_t points, const Vec3d& origin,
-                              const PoseFileOptions& options, const RunContext& context);
+Result<FrameSource<Pose>> open_poses(const std::filesystem::path& path, std::size_t points, const Vec3d& origin,
+                                     const PoseFileOptions& options, const RunContext& context);
 
 /// Any of those as the animation of `rest`, which must outlive it and is not checked.
 Result<MeshAnimation> open_animation(const std::filesystem::path& path, const Mesh& rest,
@@ -89,17 +89,17 @@ struct ChunkReport {
 Result<ChunkReport> write_animation_chunk(const MeshAnimation& animation, const std::filesystem::path& path,
                                           const WorkChunk& chunk, const RunContext& context);
 
-/// Numbered meshes alone, from whoever makes them: `mesh` gives that of a frame, 0 .. frames - 1.
-Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,
-                                                       const std::function<Result<Mesh>(std::size_t frame)>& mesh,
+/// Writes numbered meshes as write_animation does, of any faces: each frame is a mesh of its own.
+Result<std::vector<std::string>> write_numbered_meshes(const FrameSource<Mesh>& meshes,
                                                        const std::filesystem::path& path, const RunContext& context);
 /// Meshes that are numbered under one name.
 struct NumberedMeshes {
     NumberedName name;
-    std::function<Result<Mesh>(std::size_t frame)> mesh; ///< of a frame, 0 .. frames - 1
+    FrameSource<Mesh> meshes;
 };
-/// Several of them side by side in one folder, all or none. parts: one or more, all with the first one's folder.
-Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames, std::span<const NumberedMeshes> parts,
+/// Writes several sequences side by side into one folder, all or none. parts: one or more, all with the first one's
+/// folder and number of frames.
+Result<std::vector<std::string>> write_numbered_meshes(std::span<const NumberedMeshes> parts,
                                                        const RunContext& context);
 
 /// A mesh as it is at one moment.
@@ -109,21 +109,18 @@ struct MeshMoment {
 };
 
 /// Writes a .usda whose faces change in time: for every frame points, extent, faces, normals, colours, velocities, and
-/// the mesh's scalar `origin` as a primvar where they are there; in metres (metersPerUnit = 1). moment: of a frame, 0
-/// .. frames - 1, asked for once and in order. One frame in memory; as much room as the file again beside it while it
+/// the mesh's scalar `origin` as a primvar where they are there; in metres (metersPerUnit = 1). moments: each
+/// is asked for once and in order. One frame in memory; as much room as the file again beside it while it
 /// is written. Whole or not at all. Errors: unsuitable (no frames; a frame lacks what the first has), unwritable,
-/// cancelled, and what `moment` gives.
-Status write_usda_moments(std::size_t frames, double frames_per_second,
-                          const std::function<Result<MeshMoment>(std::size_t frame)>& moment,
-                          const std::filesystem::path& path, std::vector<std::string>& warnings,
-                          const RunContext& context);
+/// cancelled, and what `moments` gives.
+Status write_usda_moments(const FrameSource<MeshMoment>& moments, const std::filesystem::path& path,
+                          std::vector<std::string>& warnings, const RunContext& context);
 
 /// The same as a .glb of key frames, which any viewer of glTF plays: about so many keys a second, each a node that is
-/// scaled to nothing but from its time to the next one's. The first and the last frame are among them. moment: as
+/// scaled to nothing but from its time to the next one's. The first and the last frame are among them. moments: as
 /// above. asset.extras.filigree says {"export": "key frames", "keys", "seconds"}. All keys are in memory. Errors: usage
-/// (keys_per_second), unsuitable, unwritable, unsupported (4 GiB), out_of_memory, cancelled, and what `moment` gives.
-Status write_glb_moments(std::size_t frames, double frames_per_second, double keys_per_second,
-                         const std::function<Result<MeshMoment>(std::size_t frame)>& moment,
+/// (keys_per_second), unsuitable, unwritable, unsupported (4 GiB), out_of_memory, cancelled, and what `moments` gives.
+Status write_glb_moments(const FrameSource<MeshMoment>& moments, double keys_per_second,
                          const std::filesystem::path& path, const RunContext& context);
 
 } // namespace filigree

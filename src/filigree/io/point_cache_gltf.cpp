@@ -64,8 +64,8 @@ Result<VertexMatch> match_scene(const GltfScene& scene, std::size_t animation, s
 
 } // namespace
 
-Result<PoseStream> open_gltf_poses(const std::filesystem::path& path, std::size_t points, const Vec3d& origin,
-                                   const PoseFileOptions& options, const RunContext& context) {
+Result<FrameSource<Pose>> open_gltf_poses(const std::filesystem::path& path, std::size_t points, const Vec3d& origin,
+                                          const PoseFileOptions& options, const RunContext& context) {
     constexpr double kMostFrames = 1e7, kRounding = 1e-6; // of a frame: a last key that float's rounding put before it
     Result<GltfScene> read = GltfScene::read(path, context);
     if (!read) return read.error();
@@ -83,23 +83,24 @@ Result<PoseStream> open_gltf_poses(const std::filesystem::path& path, std::size_
     silent.progress = nullptr;
     Result<VertexMatch> match = match_scene(*scene, *animation, points, origin, options, path.string(), silent);
     if (!match) return match.error();
-    return PoseStream{static_cast<std::size_t>(last_frame) + 1, rate,
-                      [scene, which = *animation, first, rate, points, origin, silent, path,
-                       match = *std::move(match)](std::size_t frame) -> Result<Pose> {
-                          std::vector<Vec3f> positions(scene->mesh().vertex_count());
-                          const double seconds = first + double(frame) / rate;
-                          if (Status done = scene->positions(which, seconds, positions, silent); !done)
-                              return done.error();
-                          positions = relative_to(std::move(positions), scene->mesh().origin, origin);
-                          Pose pose;
-                          if (match.source.empty()) {
-                              pose.positions = std::move(positions);
-                              return pose;
-                          }
-                          pose.positions.resize(points);
-                          if (Status done = match.apply(positions, pose.positions, path); !done) return done.error();
-                          return pose;
-                      }};
+    return FrameSource<Pose>{static_cast<std::size_t>(last_frame) + 1, rate,
+                             [scene, which = *animation, first, rate, points, origin, silent, path,
+                              match = *std::move(match)](std::size_t frame) -> Result<Pose> {
+                                 std::vector<Vec3f> positions(scene->mesh().vertex_count());
+                                 const double seconds = first + double(frame) / rate;
+                                 if (Status done = scene->positions(which, seconds, positions, silent); !done)
+                                     return done.error();
+                                 positions = relative_to(std::move(positions), scene->mesh().origin, origin);
+                                 Pose pose;
+                                 if (match.source.empty()) {
+                                     pose.positions = std::move(positions);
+                                     return pose;
+                                 }
+                                 pose.positions.resize(points);
+                                 if (Status done = match.apply(positions, pose.positions, path); !done)
+                                     return done.error();
+                                 return pose;
+                             }};
 }
 
 } // namespace filigree

@@ -192,8 +192,8 @@ std::vector<fs::path> animation_files(const fs::path& path) {
     return files;
 }
 
-Result<PoseStream> open_numbered(const fs::path& path, std::size_t points, const Vec3d& origin,
-                                 const PoseFileOptions& options, const RunContext& context) {
+Result<FrameSource<Pose>> open_numbered(const fs::path& path, std::size_t points, const Vec3d& origin,
+                                        const PoseFileOptions& options, const RunContext& context) {
     std::optional<NumberedName> name = numbered_name(path);
     const Result<std::vector<std::string>> names = file_names_in(name ? name->folder : path);
     if (!names) return names.error();
@@ -210,10 +210,9 @@ Result<PoseStream> open_numbered(const fs::path& path, std::size_t points, const
     Result<SequenceKind> kind = look_at_first(files->front(), points, origin, options, silent);
     if (!kind) return kind.error();
     const std::size_t frames = files->size();
-    return PoseStream{frames, options.frames_per_second.value_or(kUnsaidRate),
-                      [files = std::move(*files), points, origin, kind = *std::move(kind), silent](std::size_t frame) {
-                          return read_pose(files[frame], points, origin, kind, silent);
-                      }};
+    return FrameSource<Pose>{frames, options.frames_per_second.value_or(kUnsaidRate),
+                             [files = std::move(*files), points, origin, kind = *std::move(kind), silent](
+                                 std::size_t frame) { return read_pose(files[frame], points, origin, kind, silent); }};
 }
 
 namespace {
@@ -225,7 +224,8 @@ public:
         silent_.progress = nullptr; // the bar tells of frames
     }
 
-    Status write(std::size_t frames, std::span<const NumberedMeshes> parts, const fs::path& folder) {
+    Status write(std::span<const NumberedMeshes> parts, const fs::path& folder) {
+        const std::size_t frames = parts.front().meshes.frames;
         Result<FileBatch> files = FileBatch::create(folder);
         if (!files) return files.error();
         for (std::size_t frame = 0; frame < frames; ++frame) {
@@ -248,7 +248,7 @@ private:
     Status write_frame(const NumberedMeshes& part, std::size_t frame, const FileBatch& files) {
         const fs::path target = part.name.file(frame + 1), file = files.path(target.filename().string());
         if (Status free = files.check_place(target.filename().string()); !free) return free;
-        Result<Mesh> mesh = part.mesh(frame);
+        Result<Mesh> mesh = part.meshes.frame(frame);
         if (!mesh) return mesh.error();
         const Result<MeshFormat> format = mesh_format(target);
         const bool is_obj = format && *format == MeshFormat::obj;
@@ -265,31 +265,30 @@ private:
 
 } // namespace
 
-Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames,
-                                                       const std::function<Result<Mesh>(std::size_t frame)>& mesh,
-                                                       const fs::path& path, const RunContext& context) {
+Result<std::vector<std::string>> write_numbered_meshes(const FrameSource<Mesh>& meshes, const fs::path& path,
+                                                       const RunContext& context) {
     std::optional<NumberedName> name = numbered_name(path);
     if (!name) {
         const fs::path folder = path.has_filename() ? path : path.parent_path();
         name = NumberedName{folder, folder.filename().string() + "_", ".ply"};
     }
-    const NumberedMeshes only{*name, mesh};
-    return write_numbered_meshes(frames, std::span(&only, 1), context);
+    const NumberedMeshes only{*name, meshes};
+    return write_numbered_meshes(std::span(&only, 1), context);
 }
 
-Result<std::vector<std::string>> write_numbered_meshes(std::size_t frames, std::span<const NumberedMeshes> parts,
+Result<std::vector<std::string>> write_numbered_meshes(std::span<const NumberedMeshes> parts,
                                                        const RunContext& context) {
     const fs::path& named = parts.front().name.folder;
     const fs::path folder = named.empty() ? fs::path(".") : named;
     const NewFolders folders(folder);
     if (!folders.are_there()) return cannot_write(folder, "the folder cannot be made");
     NumberedWriter writer(context);
-    if (Status written = writer.write(frames, parts, folder); !written) {
+    if (Status written = writer.write(parts, folder); !written) {
         folders.remove();
         return written.error();
     }
     context.report("writing", 1);
-    for (const NumberedMeshes& part : parts) warn_of_leftovers(part.name, frames, writer.warnings());
+    for (const NumberedMeshes& part : parts) warn_of_leftovers(part.name, part.meshes.frames, writer.warnings());
     return writer.warnings();
 }
 

@@ -1,18 +1,12 @@
 // PC2 (PointCache 2) and MDD (Motion Designer): a header, then positions frame after frame. PC2 is little-endian, as we
 // are; MDD is big-endian and has a time for each frame.
 #include "filigree/io/file.h"
-#include "filigree/io/file_descriptor.h"
 #include "filigree/io/point_cache_formats.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <limits>
-
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 namespace filigree {
 
@@ -26,53 +20,29 @@ constexpr std::uint64_t kMddHeader = 8;
 constexpr std::size_t kPointBytes = sizeof(Vec3f);
 static_assert(kPointBytes == 12);
 
-/// A file that is read here and there.
-class RandomFile {
+/// A cache's bytes, and its name for what is wrong with it.
+class CacheFile {
 public:
-    static Result<std::shared_ptr<const RandomFile>> open(const fs::path& path) {
-        auto file = std::make_shared<RandomFile>();
-        file->name_ = path.string();
-        // a pipe would wait here for its writer
-        file->descriptor_ = FileDescriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-        struct stat status {};
-        if (!file->descriptor_.is_open() || ::fstat(file->descriptor_.get(), &status) != 0)
-            return Error{ErrorCode::not_found,
-                         file->name_ + ": cannot be read: " +
-                             (errno == ENOENT ? "there is no such file or folder." : "it cannot be opened.")};
-        if (S_ISDIR(status.st_mode))
-            return Error{ErrorCode::not_found, file->name_ + ": cannot be read: it is a folder."};
-        if (!S_ISREG(status.st_mode))
-            return Error{ErrorCode::unsupported,
-                         file->name_ + ": is a pipe or device, and point caches are read here and there; write it to a "
-                                       "file first."};
-        file->size_ = static_cast<std::uint64_t>(status.st_size);
-        return std::shared_ptr<const RandomFile>(std::move(file));
+    static Result<std::shared_ptr<const CacheFile>> open(const fs::path& path) {
+        Result<FileReader> bytes = FileReader::open(path);
+        if (!bytes) return bytes.error();
+        return std::make_shared<const CacheFile>(*std::move(bytes), path.string());
     }
+    CacheFile(FileReader bytes, std::string name) : bytes_(std::move(bytes)), name_(std::move(name)) {}
 
     const std::string& name() const { return name_; }
-    std::uint64_t size() const { return size_; }
+    std::uint64_t size() const { return bytes_.size(); }
     Error error(const std::string& cause) const { return {ErrorCode::bad_file, name_ + ": " + cause}; }
-
     Status read(std::uint64_t offset, void* to, std::size_t bytes) const {
-        for (char* out = static_cast<char*>(to); bytes > 0;) {
-            const ssize_t got = ::pread(descriptor_.get(), out, bytes, static_cast<off_t>(offset));
-            if (got < 0 && errno == EINTR) continue;
-            if (got < 0) return Error{ErrorCode::not_found, name_ + ": cannot be read: the device failed."};
-            if (got == 0) return error("ends too early; it was cut off, or changed while it was read.");
-            out += got;
-            offset += static_cast<std::uint64_t>(got);
-            bytes -= static_cast<std::size_t>(got);
-        }
-        return Success{};
+        return bytes_.read(offset, std::span(static_cast<char*>(to), bytes));
     }
 
 private:
+    FileReader bytes_;
     std::string name_;
-    FileDescriptor descriptor_;
-    std::uint64_t size_ = 0;
 };
 
-using FilePointer = std::shared_ptr<const RandomFile>;
+using FilePointer = std::shared_ptr<const CacheFile>;
 
 /// Turns the bytes of 32-bit words around.
 void swap_words(void* words, std::size_t count) {
@@ -90,7 +60,7 @@ std::string plural(std::uint64_t count, const char* noun) {
 }
 
 /// Holds counts of a header against the file's length and the mesh. bytes: of one frame; `before` of all else.
-Status check_counts(const RandomFile& file, std::int32_t frames, std::int32_t points, std::uint64_t before,
+Status check_counts(const CacheFile& file, std::int32_t frames, std::int32_t points, std::uint64_t before,
                     std::size_t expected_points) {
     if (frames <= 0 || points <= 0)
         return file.error("its header says " + std::to_string(frames) + " frames of " + std::to_string(points) +
@@ -107,7 +77,7 @@ Status check_counts(const RandomFile& file, std::int32_t frames, std::int32_t po
     return Success{};
 }
 
-Status read_frame(const RandomFile& file, std::uint64_t start, std::size_t frame, std::span<Vec3f> positions,
+Status read_frame(const CacheFile& file, std::uint64_t start, std::size_t frame, std::span<Vec3f> positions,
                   bool is_big_endian) {
     const std::size_t bytes = positions.size_bytes();
     if (Status read = file.read(start + std::uint64_t(frame) * bytes, positions.data(), bytes); !read) return read;
@@ -118,15 +88,16 @@ Status read_frame(const RandomFile& file, std::uint64_t start, std::size_t frame
                       " is not a finite number.");
 }
 
-PointSource source_of(FilePointer file, std::int32_t frames, double rate, std::uint64_t start, bool is_big_endian) {
-    return {static_cast<std::size_t>(frames), rate,
+MeshAnimation animation_of(FilePointer file, std::int32_t frames, double rate, std::uint64_t start,
+                           bool is_big_endian) {
+    return {nullptr, static_cast<std::size_t>(frames), rate,
             [file = std::move(file), start, is_big_endian](std::size_t frame, std::span<Vec3f> positions) {
                 return read_frame(*file, start, frame, positions, is_big_endian);
             }};
 }
 
 /// The rate that an MDD's times give. A float's rounding is taken off, so that 60 comes back as 60.
-Result<double> rate_of(const RandomFile& file, std::span<const float> times) {
+Result<double> rate_of(const CacheFile& file, std::span<const float> times) {
     constexpr double kUneven = 0.01, kRounding = 1e-5;
     if (std::any_of(times.begin(), times.end(), [](float t) { return !std::isfinite(t); }))
         return file.error("one of its times is not a finite number.");
@@ -149,14 +120,13 @@ Status check_sizes(std::size_t frames, std::size_t points, const fs::path& path)
     return Error{ErrorCode::unsupported, path.string() + ": point caches hold at most 2147483647 frames and points."};
 }
 
-Status write_frames(FileWriter& file, const MeshAnimation& animation, const FramePositions& positions,
-                    bool is_big_endian, const RunContext& context) {
+Status write_frames(FileWriter& file, const MeshAnimation& animation, bool is_big_endian, const RunContext& context) {
     std::vector<Vec3f> points(animation.rest->vertex_count());
     const std::string_view bytes(reinterpret_cast<const char*>(points.data()), points.size() * kPointBytes);
     for (std::size_t frame = 0; frame < animation.frames; ++frame) {
         context.report("writing", double(frame) / double(animation.frames));
         if (context.is_cancelled()) return cancelled_error();
-        if (Status fetched = positions(frame, points); !fetched) return fetched;
+        if (Status fetched = animation.positions(frame, points); !fetched) return fetched;
         if (is_big_endian) swap_words(points.data(), 3 * points.size());
         if (Status written = file.write(bytes); !written) return written;
     }
@@ -172,7 +142,7 @@ void append(std::string& bytes, T value) {
 
 } // namespace
 
-Result<PointSource> open_pc2(const fs::path& path, std::size_t points, std::optional<double> frames_per_second) {
+Result<MeshAnimation> open_pc2(const fs::path& path, std::size_t points, std::optional<double> frames_per_second) {
     struct {
         std::int32_t version, points;
         float first_frame, sample_rate;
@@ -180,9 +150,9 @@ Result<PointSource> open_pc2(const fs::path& path, std::size_t points, std::opti
     } header{};
     constexpr double kMostRate = 1000; // frames a sample, or samples a frame: beyond, the number is no rate
     static_assert(kPc2Magic.size() + sizeof header == kPc2HeaderBytes);
-    const Result<FilePointer> file = RandomFile::open(path);
+    const Result<FilePointer> file = CacheFile::open(path);
     if (!file) return file.error();
-    const RandomFile& in = **file;
+    const CacheFile& in = **file;
     char magic[kPc2Magic.size()];
     if (in.size() < kPc2HeaderBytes) return in.error("is too short for a PC2 point cache.");
     if (Status read = in.read(0, magic, sizeof magic); !read) return read.error();
@@ -198,14 +168,14 @@ Result<PointSource> open_pc2(const fs::path& path, std::size_t points, std::opti
     if (Status sound = check_counts(in, header.frames, header.points, kPc2HeaderBytes, points); !sound)
         return sound.error();
     const double rate = frames_per_second.value_or(kUnsaidRate) / samples;
-    return source_of(*file, header.frames, rate, kPc2HeaderBytes, false);
+    return animation_of(*file, header.frames, rate, kPc2HeaderBytes, false);
 }
 
-Result<PointSource> open_mdd(const fs::path& path, std::size_t points, std::optional<double> frames_per_second) {
+Result<MeshAnimation> open_mdd(const fs::path& path, std::size_t points, std::optional<double> frames_per_second) {
     std::int32_t counts[2] = {}; // frames, points
-    const Result<FilePointer> file = RandomFile::open(path);
+    const Result<FilePointer> file = CacheFile::open(path);
     if (!file) return file.error();
-    const RandomFile& in = **file;
+    const CacheFile& in = **file;
     if (in.size() < kMddHeader) return in.error("is too short for an MDD point cache.");
     if (Status read = in.read(0, counts, sizeof counts); !read) return read.error();
     swap_words(counts, 2);
@@ -216,7 +186,7 @@ Result<PointSource> open_mdd(const fs::path& path, std::size_t points, std::opti
     swap_words(times.data(), times.size());
     Result<double> rate = frames_per_second ? Result<double>(*frames_per_second) : rate_of(in, times);
     if (!rate) return rate.error();
-    return source_of(*file, counts[0], *rate, start, true);
+    return animation_of(*file, counts[0], *rate, start, true);
 }
 
 Result<std::string> pc2_header(std::size_t frames, std::size_t points, const fs::path& path) {
@@ -230,18 +200,16 @@ Result<std::string> pc2_header(std::size_t frames, std::size_t points, const fs:
     return header;
 }
 
-Status write_pc2(const MeshAnimation& animation, const FramePositions& positions, const fs::path& path,
-                 const RunContext& context) {
+Status write_pc2(const MeshAnimation& animation, const fs::path& path, const RunContext& context) {
     const Result<std::string> header = pc2_header(animation.frames, animation.rest->vertex_count(), path);
     if (!header) return header.error();
     Result<FileWriter> file = FileWriter::create(path);
     if (!file) return file.error();
     if (Status written = file->write(*header); !written) return written;
-    return write_frames(*file, animation, positions, false, context);
+    return write_frames(*file, animation, false, context);
 }
 
-Status write_mdd(const MeshAnimation& animation, const FramePositions& positions, const fs::path& path,
-                 const RunContext& context) {
+Status write_mdd(const MeshAnimation& animation, const fs::path& path, const RunContext& context) {
     if (Status sound = check_sizes(animation.frames, animation.rest->vertex_count(), path); !sound) return sound;
     Result<FileWriter> file = FileWriter::create(path);
     if (!file) return file.error();
@@ -258,7 +226,7 @@ Status write_mdd(const MeshAnimation& animation, const FramePositions& positions
         }
         if (frame < animation.frames) append(header, static_cast<float>(double(frame) / animation.frames_per_second));
     }
-    return write_frames(*file, animation, positions, true, context);
+    return write_frames(*file, animation, true, context);
 }
 
 } // namespace filigree

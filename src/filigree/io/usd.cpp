@@ -165,10 +165,9 @@ void add_warnings(const MeshAnimation& animation, std::vector<std::string>& warn
 /// What moves: points with their boxes, and normals where the mesh has some.
 class TimeSamples {
 public:
-    TimeSamples(const MeshAnimation& animation, const FramePositions& positions, UsdText& out,
-                const RunContext& context)
-        : animation_(animation), positions_(positions), out_(out), context_(context),
-          has_normals_(!animation.rest->normals.empty()), points_(animation.rest->vertex_count()) {}
+    TimeSamples(const MeshAnimation& animation, UsdText& out, const RunContext& context)
+        : animation_(animation), out_(out), context_(context), has_normals_(!animation.rest->normals.empty()),
+          points_(animation.rest->vertex_count()) {}
 
     Status write() {
         if (Status moved = write_points(); !moved) return moved;
@@ -177,7 +176,6 @@ public:
 
 private:
     const MeshAnimation& animation_;
-    const FramePositions& positions_;
     UsdText& out_;
     const RunContext& context_;
     bool has_normals_;
@@ -189,7 +187,7 @@ private:
         for (std::size_t frame = 0; frame < animation_.frames; ++frame) {
             context_.report("writing", done + double(frame) / double(animation_.frames) / (has_normals_ ? 2 : 1));
             if (context_.is_cancelled()) return cancelled_error();
-            if (Status fetched = positions_(frame, points_); !fetched) return fetched;
+            if (Status fetched = animation_.positions(frame, points_); !fetched) return fetched;
             write(frame);
             if (Status written = out_.finish(); !written) return written;
         }
@@ -269,9 +267,9 @@ struct SampledAttribute {
 };
 
 /// Every attribute of a mesh whose faces change.
-class Moments {
+class MomentSamples {
 public:
-    explicit Moments(const std::filesystem::path& folder) : folder_(folder) {}
+    explicit MomentSamples(const std::filesystem::path& folder) : folder_(folder) {}
 
     Status add(std::size_t frame, const MeshMoment& moment, const RunContext& context) {
         const Mesh& mesh = moment.mesh;
@@ -337,8 +335,8 @@ private:
 
 } // namespace
 
-Status write_usda(const MeshAnimation& animation, const FramePositions& positions, const std::filesystem::path& path,
-                  std::vector<std::string>& warnings, const RunContext& context) {
+Status write_usda(const MeshAnimation& animation, const std::filesystem::path& path, std::vector<std::string>& warnings,
+                  const RunContext& context) {
     Result<FileWriter> file = FileWriter::create(path);
     if (!file) return file.error();
     UsdText out(*file);
@@ -346,7 +344,7 @@ Status write_usda(const MeshAnimation& animation, const FramePositions& position
     write_faces(out, *animation.rest);
     write_uvs(out, *animation.rest);
     write_colors(out, *animation.rest);
-    if (Status moved = TimeSamples(animation, positions, out, context).write(); !moved) return moved;
+    if (Status moved = TimeSamples(animation, out, context).write(); !moved) return moved;
     out.text("}\n");
     if (Status written = out.finish(); !written) return written;
     if (context.is_cancelled()) return cancelled_error();
@@ -355,28 +353,26 @@ Status write_usda(const MeshAnimation& animation, const FramePositions& position
     return file->finish();
 }
 
-Status write_usda_moments(std::size_t frames, double frames_per_second,
-                          const std::function<Result<MeshMoment>(std::size_t frame)>& moment,
-                          const std::filesystem::path& path, std::vector<std::string>& warnings,
-                          const RunContext& context) {
-    if (frames == 0) return Error{ErrorCode::unsuitable, path.string() + ": there are no frames to write."};
+Status write_usda_moments(const FrameSource<MeshMoment>& moments, const std::filesystem::path& path,
+                          std::vector<std::string>& warnings, const RunContext& context) {
+    if (moments.frames == 0) return Error{ErrorCode::unsuitable, path.string() + ": there are no frames to write."};
     Result<FileWriter> file = FileWriter::create(path);
     if (!file) return file.error();
-    Moments moments(std::filesystem::absolute(path).parent_path());
+    MomentSamples samples(std::filesystem::absolute(path).parent_path());
     std::size_t bytes = 0;
-    for (std::size_t frame = 0; frame < frames; ++frame) {
-        context.report("writing", double(frame) / double(frames));
+    for (std::size_t frame = 0; frame < moments.frames; ++frame) {
+        context.report("writing", double(frame) / double(moments.frames));
         if (context.is_cancelled()) return cancelled_error();
-        const Result<MeshMoment> now = moment(frame);
+        const Result<MeshMoment> now = moments.frame(frame);
         if (!now) return now.error();
-        if (Status added = moments.add(frame, *now, context); !added) return added;
+        if (Status added = samples.add(frame, *now, context); !added) return added;
         bytes += 200 * now->mesh.vertex_count();
     }
     UsdText header(*file);
-    write_header(header, frames, frames_per_second, moments.origin(), 1);
+    write_header(header, moments.frames, moments.frames_per_second, samples.origin(), 1);
     header.text("    uniform token subdivisionScheme = \"none\"\n");
     if (Status written = header.finish(); !written) return written;
-    if (Status written = moments.append_to(*file); !written) return written;
+    if (Status written = samples.append_to(*file); !written) return written;
     if (Status written = file->write("}\n"); !written) return written;
     context.report("writing", 1);
     if (bytes > kLargeText)

@@ -9,8 +9,8 @@ namespace filigree {
 /// mesh has normals) normals for every frame, by the mesh's origin, which is the prim's translation, and the
 /// animation's unit (metersPerUnit) where it is known. Text of numbers,
 /// some 30 bytes a vertex and frame: for small cases. Streamed; whole or not at all. Adds warnings: what is left out,
-/// and that the file is large. Errors: unwritable, cancelled, and what `positions` gives.
-Status write_usda(const MeshAnimation& animation, const FramePositions& positions, const std::filesystem::path& path,
-                  std::vector<std::string>& warnings, const RunContext& context);
+/// and that the file is large. Errors: unwritable, cancelled, and what the animation gives.
+Status write_usda(const MeshAnimation& animation, const std::filesystem::path& path, std::vector<std::string>& warnings,
+                  const RunContext& context);
 
 } // namespace filigree

@@ -3,7 +3,7 @@
 
 #include "filigree/core/run_context.h"
 #include "filigree/melting/block_grid.h"
-#include "filigree/physics/matter_particles.h"
+#include "filigree/physics/simulation.h"
 
 namespace filigree {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/core/run_context.h"
-#include "filigree/physics/matter_particles.h"
+#include "filigree/physics/simulation.h"
 
 #include <array>
 

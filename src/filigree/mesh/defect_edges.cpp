@@ -1,5 +1,6 @@
 #include "filigree/mesh/defect_edges.h"
 
+#include "filigree/mesh/edges.h"
 #include "filigree/mesh/normals.h"
 
 #include <algorithm>
@@ -7,13 +8,8 @@
 namespace filigree {
 
 std::vector<DefectEdge> defect_edges(const Mesh& mesh) {
-    struct Side {
-        Index a, b;
-        bool is_forward;
-        auto operator<=>(const Side&) const = default;
-    };
     const double diagonal = bounds(mesh).diagonal(), least_area = 1e-14 * diagonal * diagonal;
-    std::vector<Side> sides;
+    std::vector<std::array<Index, 2>> sides; // from one corner to the next
     sides.reserve(mesh.corner_count());
     std::vector<Index> flat, corners;
     for (std::size_t face = 0; face < mesh.face_count(); ++face) {
@@ -27,17 +23,18 @@ std::vector<DefectEdge> defect_edges(const Mesh& mesh) {
         const bool repeats = std::adjacent_find(once.begin(), once.end()) != once.end();
         if (!corners.empty() && (repeats || corners.size() != mesh.face(face).size() || !(area > least_area)))
             flat.push_back(corners[0]);
-        for (std::size_t k = 0; corners.size() > 2 && k < corners.size(); ++k) {
-            const Index a = corners[k], b = corners[(k + 1) % corners.size()];
-            sides.push_back({std::min(a, b), std::max(a, b), a < b});
-        }
+        for (std::size_t k = 0; corners.size() > 2 && k < corners.size(); ++k)
+            sides.push_back({corners[k], corners[(k + 1) % corners.size()]});
     }
-    std::sort(sides.begin(), sides.end());
+    const IndexLists edges = edges_from(mesh.vertex_count(), [&](const auto& add) {
+        for (Index h = 0; h < sides.size(); ++h) add(sides[h][0], sides[h][1], h);
+    });
     std::vector<DefectEdge> defects;
-    for (std::size_t i = 0, j = 0; i < sides.size(); i = j) {
-        while (j < sides.size() && sides[j].a == sides[i].a && sides[j].b == sides[i].b) ++j;
-        const bool is_opposed = j - i == 2 && sides[i] == sides[i + 1];
-        if (j - i != 2 || is_opposed) defects.push_back({sides[i].a, sides[i].b, j - i == 1, is_opposed});
+    for (const std::span<const Index> edge : edges) {
+        const auto [a, b] = sides[edge[0]];
+        const bool is_opposed = edge.size() == 2 && sides[edge[1]] == sides[edge[0]];
+        if (edge.size() != 2 || is_opposed)
+            defects.push_back({std::min(a, b), std::max(a, b), edge.size() == 1, is_opposed});
     }
     for (const Index v : flat) defects.push_back({v, v});
     return defects;

@@ -13,7 +13,7 @@ struct DefectEdge {
     bool is_opposed = false; ///< its two faces run along it the same way; neither: it has three faces or more
 };
 /// All of them, by the rules of TopologyReport: edges, ascending, then faces. The mesh is not checked. Cost
-/// O(corners log corners).
+/// O(V + corners log d) where d edges meet at a vertex.
 std::vector<DefectEdge> defect_edges(const Mesh& mesh);
 
 } // namespace filigree

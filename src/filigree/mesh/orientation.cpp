@@ -1,6 +1,6 @@
 #include "filigree/mesh/orientation.h"
 
-#include "filigree/mesh/half_edges.h"
+#include "filigree/mesh/edges.h"
 
 #include <algorithm>
 
@@ -64,14 +64,7 @@ std::vector<std::uint8_t> triangles_to_turn(std::span<const Triangle> triangles,
 }
 
 std::size_t orient(std::span<Triangle> triangles, std::span<const Vec3f> positions) {
-    std::vector<Index> neighbour(3 * triangles.size(), kNoIndex);
-    const std::vector<Index> sorted = half_edges_by_edge(triangles, positions.size());
-    const auto apex = [&](Index h) { return half_edge_start(triangles, previous_half_edge(h)); };
-    for_each_edge(std::span<const Triangle>(triangles), sorted, [&](std::span<const Index> edge) {
-        if (edge.size() != 2 || apex(edge[0]) == apex(edge[1])) return;
-        neighbour[edge[0]] = edge[1];
-        neighbour[edge[1]] = edge[0];
-    });
+    const std::vector<Index> neighbour = neighbour_half_edges(triangles, edges_of(triangles, positions.size()));
     const std::vector<std::uint8_t> turn = triangles_to_turn(triangles, neighbour, positions, OneSided::left);
     for (std::size_t t = 0; t < triangles.size(); ++t)
         if (turn[t]) std::swap(triangles[t][1], triangles[t][2]);

@@ -12,7 +12,7 @@ enum class OneSided { turned, left };
 
 /// Which triangles to turn over so that neighbours agree: a byte each, 1 to turn. A component keeps the way that three
 /// quarters of its area have; where neither has so much, it gets a positive volume. neighbour: of each half-edge
-/// (mesh/half_edges.h) the one along the same edge, whichever way it runs, or kNoIndex. Cost O(F).
+/// (mesh/edges.h) the one along the same edge, whichever way it runs, or kNoIndex. Cost O(F).
 std::vector<std::uint8_t> triangles_to_turn(std::span<const Triangle> triangles, std::span<const Index> neighbour,
                                             std::span<const Vec3f> positions, OneSided one_sided);
 

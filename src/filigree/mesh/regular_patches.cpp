@@ -4,6 +4,8 @@
 // so that one pass follows all four guesses.
 #include "filigree/mesh/regular_patches.h"
 
+#include "filigree/mesh/edges.h"
+
 #include <algorithm>
 #include <optional>
 
@@ -60,35 +62,23 @@ std::optional<Error> check_quads(const Mesh& mesh) {
 
 /// Pairs the half-edges that run along the same two vertices in opposite directions.
 std::optional<Error> match_twins(Quads& quads, std::size_t vertex_count) {
-    const std::size_t count = quads.corners.size();
-    const auto ends = [&](std::size_t h) {
-        return std::minmax(quads.corners[h], quads.corners[next(static_cast<Index>(h))]);
-    };
-    std::vector<Index> offsets(vertex_count + 1, 0);
-    for (std::size_t h = 0; h < count; ++h) ++offsets[ends(h).first];
-    Index sum = 0;
-    for (Index& offset : offsets) sum += std::exchange(offset, sum);
-    // Buckets by the lower end; an entry is the higher end, then the half-edge.
-    std::vector<std::uint64_t> entries(count);
-    for (std::size_t h = 0; h < count; ++h) {
-        const auto [low, high] = ends(h);
-        entries[offsets[low]++] = std::uint64_t{high} << 32 | h;
-    }
-    quads.twins.assign(count, kNoIndex);
-    for (std::size_t v = 0, begin = 0; v < vertex_count; begin = offsets[v++]) {
-        std::sort(entries.begin() + begin, entries.begin() + offsets[v]);
-        for (std::size_t e = begin; e + 1 < offsets[v]; ++e) {
-            if (entries[e] >> 32 != entries[e + 1] >> 32) continue;
-            const Index a = static_cast<Index>(entries[e]), b = static_cast<Index>(entries[e + 1]);
-            const std::string edge =
-                "the edge between vertices " + std::to_string(v) + " and " + std::to_string(entries[e] >> 32);
-            if (quads.twins[a] != kNoIndex) return unsuitable("More than two faces meet at " + edge);
-            if (quads.corners[a] == quads.corners[b])
-                return unsuitable("The faces " + std::to_string(face_of(a)) + " and " + std::to_string(face_of(b)) +
-                                  " are turned against each other at " + edge);
-            quads.twins[a] = b;
-            quads.twins[b] = a;
-        }
+    const IndexLists edges = edges_from(vertex_count, [&](const auto& add) {
+        for (Index h = 0; h < quads.corners.size(); ++h) add(quads.corners[h], quads.corners[next(h)], h);
+    });
+    quads.twins.assign(quads.corners.size(), kNoIndex);
+    for (const std::span<const Index> edge : edges) {
+        if (edge.size() == 1) continue;
+        const Index a = edge[0], b = edge[1];
+        const auto place = [&] {
+            const auto [low, high] = std::minmax(quads.corners[a], quads.corners[next(a)]);
+            return "the edge between vertices " + std::to_string(low) + " and " + std::to_string(high);
+        };
+        if (quads.corners[a] == quads.corners[b])
+            return unsuitable("The faces " + std::to_string(face_of(a)) + " and " + std::to_string(face_of(b)) +
+                              " are turned against each other at " + place());
+        if (edge.size() > 2) return unsuitable("More than two faces meet at " + place());
+        quads.twins[a] = b;
+        quads.twins[b] = a;
     }
     return std::nullopt;
 }

@@ -8,7 +8,7 @@ namespace filigree {
 
 /// The welded triangles of a mesh. Vertex ids are the mesh's own, so its positions and attributes serve unchanged; of
 /// the vertices at one place only the lowest, their representative, is in triangles. For the triangles at each vertex
-/// see triangles_at_vertices (mesh/incidence.h).
+/// see triangles_at_vertices (mesh/edges.h).
 struct Surface {
     std::vector<Index> representative; ///< of each vertex: the lowest vertex at its place; see weld_map
     std::size_t place_count = 0;       ///< distinct positions, whether a face uses them or not
@@ -20,7 +20,7 @@ struct Surface {
 
 /// Welds and triangulates; faces keep their order. Cost: O(size) for checking and welding, and that of triangulate.
 /// Errors: usage (check_mesh refuses the mesh), unsuitable (more triangles than kMostListedTriangles, see
-/// mesh/incidence.h), cancelled.
+/// mesh/edges.h), cancelled.
 Result<Surface> make_surface(const Mesh& mesh, const RunContext& context);
 
 } // namespace filigree

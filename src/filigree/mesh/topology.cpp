@@ -5,7 +5,7 @@
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/random.h"
-#include "filigree/mesh/incidence.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/mesh/weld.h"
 
@@ -31,7 +31,7 @@ void append(Finding& finding, const Finding& later) {
 
 /// What the passes over vertices need to know of faces and corners.
 struct Incidence {
-    std::vector<Index> face_of_corner;
+    PolygonCorners polygons;
     IndexLists corners_at;                      ///< of each vertex
     std::vector<Index> lowest_vertex;           ///< of each face
     std::vector<std::uint64_t> vertex_set_hash; ///< of each face, whatever the order
@@ -53,7 +53,7 @@ std::size_t distinct_corners(std::span<const Index> face) {
 Incidence gather_incidence(const Mesh& mesh, const RunContext& context) {
     const std::size_t faces = mesh.face_count();
     Incidence in;
-    in.face_of_corner.resize(mesh.corner_count());
+    in.polygons = PolygonCorners(mesh.face_offsets);
     in.lowest_vertex.resize(faces);
     in.vertex_set_hash.resize(faces);
     in.collapsed.resize(faces);
@@ -65,8 +65,6 @@ Incidence gather_incidence(const Mesh& mesh, const RunContext& context) {
             in.vertex_set_hash[f] = hash;
             in.lowest_vertex[f] = std::ranges::min(mesh.face(f));
             in.collapsed[f] = distinct_corners(mesh.face(f)) < 3;
-            for (Index c = mesh.face_offsets[f]; c < mesh.face_offsets[f + 1]; ++c)
-                in.face_of_corner[c] = static_cast<Index>(f);
         }
     });
     in.corners_at = corners_at_vertices(mesh.corners, mesh.vertex_count());
@@ -110,15 +108,14 @@ private:
         sides_.clear();
         fan_parent_.clear();
         for (std::size_t i = 0; i < corners.size(); ++i) {
-            const Index face = in_.face_of_corner[corners[i]];
-            if (i > 0 && in_.face_of_corner[corners[i - 1]] == face)
+            const Index face = in_.polygons.face(corners[i]);
+            if (i > 0 && in_.polygons.face(corners[i - 1]) == face)
                 std::atomic_ref(in_.degenerate[face]).store(1, std::memory_order_relaxed);
             if (in_.collapsed[face]) continue;
-            const Index first = mesh_.face_offsets[face], end = mesh_.face_offsets[face + 1];
-            const Index before = mesh_.corners[(corners[i] == first ? end : corners[i]) - 1];
+            const Index before = mesh_.corners[in_.polygons.previous(corners[i])];
             if (before == vertex) continue; // seen from the first of the corners that repeat one another
             Index after = corners[i];
-            do after = after + 1 == end ? first : after + 1;
+            do after = in_.polygons.next(after);
             while (mesh_.corners[after] == vertex);
             const Index fan = static_cast<Index>(fan_parent_.size());
             fan_parent_.push_back(fan);
@@ -169,7 +166,7 @@ private:
     void find_duplicate_faces(Index vertex, std::span<const Index> corners, VertexFindings& found) {
         candidates_.clear();
         for (const Index c : corners) {
-            const Index face = in_.face_of_corner[c];
+            const Index face = in_.polygons.face(c);
             if (in_.lowest_vertex[face] == vertex) candidates_.emplace_back(in_.vertex_set_hash[face], face);
         }
         if (candidates_.size() < 2) return;

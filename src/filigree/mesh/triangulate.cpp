@@ -3,7 +3,7 @@
 //   outlines with bridged holes work too.
 #include "filigree/mesh/triangulate.h"
 
-#include "filigree/mesh/incidence.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/mesh/normals.h"
 
 #include <algorithm>
@@ -135,6 +135,12 @@ void triangulate_polygon(std::span<const Vec3f> positions, std::span<const Index
 }
 
 } // namespace
+
+std::optional<Error> too_many_triangles(std::size_t count) {
+    if (count <= kMostListedTriangles) return std::nullopt;
+    return Error{ErrorCode::unsuitable, "The mesh has more triangles than 32-bit indices can list (" +
+                                            std::to_string(kMostListedTriangles) + "); split it into parts."};
+}
 
 Triangulation triangulate(const Mesh& mesh) {
     return triangulate(mesh, RunContext(1)).value(); // nobody else has the context, so nobody cancels

@@ -1,5 +1,7 @@
 #include "filigree/mesh/weld.h"
 
+#include "filigree/core/hash.h"
+
 #include <array>
 #include <bit>
 
@@ -13,12 +15,6 @@ std::array<std::uint32_t, 3> position_key(const Vec3f& p) {
     return key;
 }
 
-std::uint64_t hash(const std::array<std::uint32_t, 3>& key) {
-    std::uint64_t h = (std::uint64_t{key[0]} << 32 | key[1]) * 0x9E3779B97F4A7C15u;
-    h = (h ^ (h >> 29) ^ key[2]) * 0xBF58476D1CE4E5B9u;
-    return h ^ (h >> 32);
-}
-
 } // namespace
 
 std::vector<Index> weld_map(std::span<const Vec3f> positions) {
@@ -26,7 +22,7 @@ std::vector<Index> weld_map(std::span<const Vec3f> positions) {
     std::vector<Index> table(slots, kNoIndex), representative(positions.size());
     for (Index v = 0; v < positions.size(); ++v) {
         const auto key = position_key(positions[v]);
-        std::size_t slot = hash(key) & (slots - 1);
+        std::size_t slot = hash_words(std::uint64_t{key[0]} << 32 | key[1], key[2]) & (slots - 1);
         while (table[slot] != kNoIndex && position_key(positions[table[slot]]) != key) slot = (slot + 1) & (slots - 1);
         if (table[slot] == kNoIndex) table[slot] = v;
         representative[v] = table[slot];

@@ -3,8 +3,7 @@
 
 #include "filigree/core/run_context.h"
 #include "filigree/hierarchy/pose_error.h"
-#include "filigree/render/camera.h"
-#include "filigree/render/color_map.h"
+#include "filigree/render.h"
 
 #include <string>
 

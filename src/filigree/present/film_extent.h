@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/core/view.h"
-#include "filigree/render/camera.h"
+#include "filigree/render.h"
 
 #include <optional>
 #include <span>

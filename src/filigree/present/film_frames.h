@@ -3,7 +3,7 @@
 
 #include "filigree/core/run_context.h"
 #include "filigree/hierarchy/model.h"
-#include "filigree/render/film.h"
+#include "filigree/render.h"
 
 #include <functional>
 #include <span>

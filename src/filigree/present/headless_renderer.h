@@ -1,8 +1,7 @@
 // Pictures without a window: an OpenGL context and a renderer in it.
 #pragma once
 
-#include "filigree/render/gl_context.h"
-#include "filigree/render/renderer.h"
+#include "filigree/render.h"
 
 namespace filigree {
 

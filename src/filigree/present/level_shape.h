@@ -3,9 +3,8 @@
 
 #include "filigree/hierarchy/restore.h"
 #include "filigree/mesh/triangulate.h"
-#include "filigree/render/camera.h"
+#include "filigree/render.h"
 #include "filigree/render/level_choice.h"
-#include "filigree/render/renderer.h"
 
 #include <memory>
 #include <optional>

@@ -3,9 +3,7 @@
 
 #include "filigree/hierarchy/pose.h"
 #include "filigree/hierarchy/restore.h"
-#include "filigree/render/camera.h"
-#include "filigree/render/drawable.h"
-#include "filigree/render/renderer.h"
+#include "filigree/render.h"
 #include "filigree/scene/dropped_body.h"
 
 #include <memory>

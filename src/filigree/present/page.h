@@ -1,8 +1,7 @@
 // A page of vector drawing: lines, text and pictures, kept as they are in SVG and PDF and drawn sharp in PNG.
 #pragma once
 
-#include "filigree/render/color_map.h"
-#include "filigree/render/picture.h"
+#include "filigree/render.h"
 
 #include <Eigen/Core>
 

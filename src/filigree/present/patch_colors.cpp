@@ -1,6 +1,6 @@
 #include "filigree/present/patch_colors.h"
 
-#include "filigree/render/color_map.h"
+#include "filigree/render.h"
 
 #include <algorithm>
 #include <map>

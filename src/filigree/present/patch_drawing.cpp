@@ -1,7 +1,7 @@
 #include "filigree/present/patch_drawing.h"
 
 #include "filigree/present/patch_colors.h"
-#include "filigree/render/color_map.h"
+#include "filigree/render.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "filigree/mesh/regular_patches.h"
-#include "filigree/render/renderer.h"
+#include "filigree/render.h"
 
 namespace filigree {
 

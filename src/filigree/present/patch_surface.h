@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/hierarchy/model.h"
-#include "filigree/render/drawable.h"
+#include "filigree/render.h"
 
 #include <cstdint>
 #include <memory>

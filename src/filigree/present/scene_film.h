@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/present/headless_renderer.h"
-#include "filigree/render/film.h"
+#include "filigree/render.h"
 #include "filigree/scene/recording.h"
 #include "filigree/scene/world_setup.h"
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/core/result.h"
-#include "filigree/render/drawable.h"
+#include "filigree/render.h"
 #include "filigree/scene/body_look.h"
 #include "filigree/scene/world_setup.h"
 

@@ -56,10 +56,10 @@ private:
     /// Sectors of one triangle that should be two quads get a second one: the edge across is flipped, or split.
     void widen_sectors() {
         for (Index h = 0; h < 3 * map_.slot_count(); ++h) {
-            if (map_.is_removed(h / 3) || !map_.is_feature(h) || !map_.is_feature(SurfaceMap::previous(h)) ||
+            if (map_.is_removed(h / 3) || !map_.is_feature(h) || !map_.is_feature(previous_half_edge(h)) ||
                 !needs_two(h))
                 continue;
-            const Index across = SurfaceMap::next(h);
+            const Index across = next_half_edge(h);
             if (!map_.is_feature(across) && flips_well(across))
                 map_.flip(across);
             else
@@ -69,7 +69,7 @@ private:
 
     bool flips_well(Index h) const {
         const Index g = map_.twin(h);
-        const Index c = map_.from(SurfaceMap::previous(h)), d = map_.from(SurfaceMap::previous(g));
+        const Index c = map_.from(previous_half_edge(h)), d = map_.from(previous_half_edge(g));
         if (c == d || map_.are_neighbours(c, d)) return false;
         for (const Index half : {h, g}) {
             const VertexKind kind = map_.kind(map_.from(half));
@@ -199,7 +199,7 @@ private:
         Index h = map_.out(from);
         do {
             if (map_.to(h) == to) return h;
-            const Index p = SurfaceMap::previous(h);
+            const Index p = previous_half_edge(h);
             if (map_.from(p) == to) return p;
             if (map_.is_border(p)) return kNoIndex;
             h = map_.twin(p);
@@ -250,8 +250,8 @@ private:
                 const double worth = valence_worth(h) + valence_worth(g);
                 if (worth < -9) continue;
                 const double jacobian =
-                    scaled_jacobian(map_.position(map_.from(h)), map_.position(map_.from(SurfaceMap::previous(g))),
-                                    map_.position(map_.to(h)), map_.position(map_.from(SurfaceMap::previous(h))));
+                    scaled_jacobian(map_.position(map_.from(h)), map_.position(map_.from(previous_half_edge(g))),
+                                    map_.position(map_.to(h)), map_.position(map_.from(previous_half_edge(h))));
                 weights[3 * t + k] = std::clamp((jacobian + 0.6 * worth + 4.6) / 6.2, 0.0, 1.0);
             }
         const std::vector<Index> pairs = match_triangles(opposite, weights, [&] { return context.is_cancelled(); });
@@ -282,7 +282,7 @@ private:
         if (!map_.flatten(star)) return false;
         Index outer = kNoIndex; // the partner of the one triangle whose partner is not at the vertex
         for (const Index h : star.half_edges)
-            if (!is_diagonal(h) && !is_diagonal(SurfaceMap::previous(h))) outer = partner_[h / 3];
+            if (!is_diagonal(h) && !is_diagonal(previous_half_edge(h))) outer = partner_[h / 3];
         for (std::size_t target = 0; target < star.ring.size(); ++target) {
             const Index v = star.ring[target];
             bool possible = true;
@@ -337,7 +337,7 @@ private:
         Index h = map_.out(v);
         do {
             angle += map_.corner_angle(h);
-            h = map_.twin(SurfaceMap::previous(h));
+            h = map_.twin(previous_half_edge(h));
         } while (h != map_.out(v));
         return angle < kTipAngle;
     }
@@ -368,14 +368,13 @@ private:
             quad.corners[slot][half % 3] = outline[place];
         };
         corner(0, h, 0);
-        corner(0, SurfaceMap::next(h), 2);
-        corner(0, SurfaceMap::previous(h), 3);
+        corner(0, next_half_edge(h), 2);
+        corner(0, previous_half_edge(h), 3);
         corner(1, g, 2);
-        corner(1, SurfaceMap::next(g), 0);
-        corner(1, SurfaceMap::previous(g), 1);
+        corner(1, next_half_edge(g), 0);
+        corner(1, previous_half_edge(g), 1);
         // sides from a to d, d to b, b to c, c to a
-        add(quad, outline,
-            {SurfaceMap::next(g), SurfaceMap::previous(g), SurfaceMap::next(h), SurfaceMap::previous(h)});
+        add(quad, outline, {next_half_edge(g), previous_half_edge(g), next_half_edge(h), previous_half_edge(h)});
     }
 
     void add_triangle(Index s) {

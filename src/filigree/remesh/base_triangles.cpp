@@ -135,9 +135,9 @@ private:
             for (const Index h : star_.half_edges) {
                 add_planes(h / 3, middle);
                 push(h);
-                push(SurfaceMap::next(h)); // as long as before, but its half-edge may be another now
+                push(next_half_edge(h)); // as long as before, but its half-edge may be another now
             }
-            if (star_.open) push(SurfaceMap::previous(star_.half_edges.back()));
+            if (star_.open) push(previous_half_edge(star_.half_edges.back()));
         }
     }
 
@@ -295,12 +295,12 @@ private:
         const auto keeps = [&](std::size_t beside, std::size_t triangle) {
             const Index w = star_.ring[beside], arm = star_.half_edges[triangle];
             // the sides of this triangle other than the edge that collapses
-            const Index to_ring = SurfaceMap::next(arm);
-            const Index at_centre = beside == triangle ? arm : SurfaceMap::previous(arm);
+            const Index to_ring = next_half_edge(arm);
+            const Index at_centre = beside == triangle ? arm : previous_half_edge(arm);
             if (map_.is_feature(at_centre) &&
                 (map_.is_feature(to_ring) || map_.kind(star_.centre) != VertexKind::inside))
                 return false;
-            const Index at_w = beside == triangle ? to_ring : SurfaceMap::previous(arm);
+            const Index at_w = beside == triangle ? to_ring : previous_half_edge(arm);
             const std::size_t left = map_.sector_size(at_w) - 1;
             switch (map_.kind(w)) {
             case VertexKind::inside:
@@ -333,7 +333,7 @@ private:
         Index h = first;
         do {
             shared += marks_[map_.to(h)] == mark_;
-            const Index p = SurfaceMap::previous(h);
+            const Index p = previous_half_edge(h);
             if (map_.is_border(p)) {
                 shared += marks_[map_.from(p)] == mark_;
                 break;
@@ -388,7 +388,7 @@ private:
 
     bool can_flip(Index h) const {
         const Index g = map_.twin(h), a = map_.from(h), b = map_.to(h);
-        const Index c = map_.from(SurfaceMap::previous(h)), d = map_.from(SurfaceMap::previous(g));
+        const Index c = map_.from(previous_half_edge(h)), d = map_.from(previous_half_edge(g));
         if (c == d || map_.are_neighbours(c, d)) return false;
         for (const Index half : {h, g}) {
             const Index v = map_.from(half);
@@ -412,7 +412,7 @@ private:
     bool should_flip(Index h) const {
         const Index g = map_.twin(h);
         const Vec3d &a = map_.position(map_.from(h)), &b = map_.position(map_.to(h));
-        const Index at_c = SurfaceMap::previous(h), at_d = SurfaceMap::previous(g);
+        const Index at_c = previous_half_edge(h), at_d = previous_half_edge(g);
         const Vec3d &c = map_.position(map_.from(at_c)), &d = map_.position(map_.from(at_d));
         const double before = std::min(shape(a, b, c), shape(b, a, d)),
                      after = std::min(shape(c, a, d), shape(d, b, c));

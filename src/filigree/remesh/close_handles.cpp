@@ -6,7 +6,7 @@
 // 2001], a short walk around each of these edges finds the handle's shortest loop, and no region is grown everywhere.
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/random.h"
-#include "filigree/mesh/half_edges.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/remesh/manifold_surface.h"
 
 #include <algorithm>
@@ -127,16 +127,13 @@ std::vector<Index> grow_tree(const CappedSurface& surface, Index root, std::vect
 std::vector<Index> grow_cotree(const CappedSurface& surface, std::span<const Index> depth, std::vector<Role>& role) {
     const auto key = [&](Index h) { return depth[surface.start(h)] + depth[surface.end(h)]; };
     const auto is_candidate = [&](Index h) { return h < surface.opposite[h] && role[h] == Role::none; };
-    std::vector<Index> offsets(2 * std::ranges::max(depth) + 2, 0);
-    for (Index h = 0; h < role.size(); ++h)
-        if (is_candidate(h)) ++offsets[key(h) + 1];
-    std::inclusive_scan(offsets.begin(), offsets.end(), offsets.begin());
-    std::vector<Index> sorted(offsets.back());
-    for (Index h = 0; h < role.size(); ++h)
-        if (is_candidate(h)) sorted[offsets[key(h)]++] = h;
+    const IndexLists sorted = make_lists<Index>(2 * std::ranges::max(depth) + 1, [&](const auto& add) {
+        for (Index h = 0; h < role.size(); ++h)
+            if (is_candidate(h)) add(key(h), h);
+    });
     std::vector<Index> left_over;
     DisjointSets sets(surface.triangles.size());
-    for (auto h = sorted.rbegin(); h != sorted.rend(); ++h) {
+    for (auto h = sorted.items.rbegin(); h != sorted.items.rend(); ++h) {
         if (sets.join(*h / 3, surface.opposite[*h] / 3))
             role[*h] = role[surface.opposite[*h]] = Role::cotree;
         else

@@ -1,7 +1,7 @@
 #include "filigree/remesh/feature_curves.h"
 
 #include "filigree/core/disjoint_sets.h"
-#include "filigree/mesh/half_edges.h"
+#include "filigree/mesh/edges.h"
 
 #include <algorithm>
 #include <cmath>
@@ -24,45 +24,33 @@ constexpr double kClearlySharp = 20 * std::numbers::pi / 180; // beyond the aske
 
 struct Curves {
     const ManifoldSurface& surface;
-    std::vector<Index> offsets, neighbours; ///< of each vertex, along sharp edges and borders
-    std::vector<float> angles;              ///< of the edges to those neighbours, radians
+    /// An edge from a vertex, along a curve.
+    struct Edge {
+        Index end;
+        float angle; ///< radians
+    };
+    Lists<Edge> edges; ///< of each vertex: sharp ones and borders
 
-    std::size_t degree(Index v) const { return offsets[v + 1] - offsets[v]; }
+    std::size_t degree(Index v) const { return edges[v].size(); }
     double length(Index a, Index b) const { return (surface.positions[a] - surface.positions[b]).norm(); }
     double angle(Index from, Index to) const {
         if (degree(to) < degree(from)) std::swap(from, to); // the ends of spokes know them sooner than the hub
-        Index i = offsets[from];
-        while (neighbours[i] != to) ++i;
-        return angles[i];
+        return std::ranges::find(edges[from], to, &Edge::end)->angle;
     }
     /// The neighbour of a curve vertex that is not `from`.
-    Index onward(Index v, Index from) const {
-        return neighbours[offsets[v]] == from ? neighbours[offsets[v] + 1] : neighbours[offsets[v]];
-    }
+    Index onward(Index v, Index from) const { return edges[v][edges[v][0].end == from ? 1 : 0].end; }
 };
 
 /// marked: the angle of half-edges that are sharp, else 0; each edge counts once.
 Curves collect(const ManifoldSurface& surface, std::span<const Index> twins, std::span<const float> marked) {
-    Curves curves{surface, std::vector<Index>(surface.positions.size() + 1, 0), {}, {}};
-    const auto for_each_edge = [&](const auto& act) {
-        for (Index h = 0; h < twins.size(); ++h)
-            if (twins[h] == kNoIndex || (marked[h] > 0 && h < twins[h]))
-                act(half_edge_start(surface.triangles, h), half_edge_end(surface.triangles, h), marked[h]);
-    };
-    for_each_edge([&](Index a, Index b, float) {
-        ++curves.offsets[a + 1];
-        ++curves.offsets[b + 1];
-    });
-    for (std::size_t v = 0; v < surface.positions.size(); ++v) curves.offsets[v + 1] += curves.offsets[v];
-    curves.neighbours.resize(curves.offsets.back());
-    curves.angles.resize(curves.offsets.back());
-    std::vector<Index> next(curves.offsets.begin(), curves.offsets.end() - 1);
-    for_each_edge([&](Index a, Index b, float angle) {
-        curves.angles[next[a]] = curves.angles[next[b]] = angle;
-        curves.neighbours[next[a]++] = b;
-        curves.neighbours[next[b]++] = a;
-    });
-    return curves;
+    return {surface, make_lists<Curves::Edge>(surface.positions.size(), [&](const auto& add) {
+                for (Index h = 0; h < twins.size(); ++h) {
+                    if (twins[h] != kNoIndex && !(marked[h] > 0 && h < twins[h])) continue;
+                    const Index a = half_edge_start(surface.triangles, h), b = half_edge_end(surface.triangles, h);
+                    add(a, {b, marked[h]});
+                    add(b, {a, marked[h]});
+                }
+            })};
 }
 
 struct Chain {
@@ -97,8 +85,7 @@ std::vector<Chain> chains_of(const Curves& curves) {
     };
     for (Index v = 0; v < vertex_count; ++v) {
         if (curves.degree(v) == 0 || curves.degree(v) == 2) continue;
-        for (Index i = curves.offsets[v]; i < curves.offsets[v + 1]; ++i) {
-            const Index w = curves.neighbours[i];
+        for (const auto& [w, angle] : curves.edges[v]) {
             if (curves.degree(w) == 2 && seen[w]) continue;
             if (curves.degree(w) != 2 && w < v) continue; // a single edge between two nodes, from its other end
             chains.push_back(walk(v, w));
@@ -107,7 +94,7 @@ std::vector<Chain> chains_of(const Curves& curves) {
     for (Index v = 0; v < vertex_count; ++v)
         if (curves.degree(v) == 2 && !seen[v]) {
             seen[v] = 1;
-            chains.push_back(walk(v, curves.neighbours[curves.offsets[v]]));
+            chains.push_back(walk(v, curves.edges[v][0].end));
         }
     return chains;
 }
@@ -189,7 +176,7 @@ std::vector<std::uint8_t> find_corners(const Curves& curves, double reach) {
     std::vector<float> turn(vertex_count, 0);
     for (Index v = 0; v < vertex_count; ++v) {
         if (curves.degree(v) != 2) continue;
-        const Index a = curves.neighbours[curves.offsets[v]], b = curves.neighbours[curves.offsets[v] + 1];
+        const Index a = curves.edges[v][0].end, b = curves.edges[v][1].end;
         if (a == b) continue;
         const Vec3d to_a = chord(curves, v, a, reach), to_b = chord(curves, v, b, reach);
         turn[v] = static_cast<float>(std::numbers::pi - std::atan2(to_a.cross(to_b).norm(), to_a.dot(to_b)));
@@ -198,8 +185,9 @@ std::vector<std::uint8_t> find_corners(const Curves& curves, double reach) {
     for (Index v = 0; v < vertex_count; ++v) {
         if (turn[v] < kCornerTurn) continue;
         bool largest = true;
-        for (Index i = curves.offsets[v]; i < curves.offsets[v + 1] && largest; ++i) {
-            Index before = v, at = curves.neighbours[i];
+        for (const Curves::Edge& edge : curves.edges[v]) {
+            if (!largest) break;
+            Index before = v, at = edge.end;
             double gone = curves.length(v, at);
             for (int k = 0; k < kMostSteps && gone < reach && curves.degree(at) == 2 && at != v && largest; ++k) {
                 largest = turn[at] < turn[v] || (turn[at] == turn[v] && at > v);

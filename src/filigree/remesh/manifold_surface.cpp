@@ -5,7 +5,8 @@
 
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
-#include "filigree/mesh/half_edges.h"
+#include "filigree/core/random.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/mesh/orientation.h"
 #include "filigree/mesh/triangulate.h"
 #include "filigree/mesh/weld.h"
@@ -62,7 +63,7 @@ std::vector<Index> repeated_polygons(const Mesh& mesh, std::span<const Index> we
     for (Index f = 0; f < mesh.face_count(); ++f) {
         if (mesh.face_size(f) < 4) continue;
         std::uint64_t key = mesh.face_size(f);
-        for (const Index v : mesh.face(f)) key += (welded[v] + 1) * 0x9E3779B97F4A7C15u ^ (welded[v] + 1) >> 7;
+        for (const Index v : mesh.face(f)) key += random_bits(0, welded[v]);
         keys.emplace_back(key, f);
     }
     std::sort(keys.begin(), keys.end());
@@ -122,31 +123,30 @@ void drop_degenerate(Soup& soup, CleanReport& report) {
 }
 
 /// For each triangle the first one over the same vertices, in any order.
-std::vector<Index> first_copies(std::span<const Triangle> triangles, std::span<const Index> sorted) {
+std::vector<Index> first_copies(std::span<const Triangle> triangles, const IndexLists& edges) {
     std::vector<Index> first(triangles.size());
     std::iota(first.begin(), first.end(), Index{0});
     std::vector<std::pair<Index, Index>> apexes; // and triangles, of one edge
-    for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
-        if (edge.size() < 2) return;
+    for (const std::span<const Index> edge : edges) {
+        if (edge.size() < 2) continue;
         apexes.clear();
-        for (const Index h : edge) apexes.emplace_back(half_edge_start(triangles, previous_half_edge(h)), h / 3);
+        for (const Index h : edge) apexes.emplace_back(half_edge_apex(triangles, h), h / 3);
         std::ranges::sort(apexes);
         for (std::size_t i = 1; i < apexes.size(); ++i)
             if (apexes[i].first == apexes[i - 1].first) first[apexes[i].second] = first[apexes[i - 1].second];
-    });
+    }
     return first;
 }
 
 /// Which triangles belong to walls inside: patches of triangles that are doubled, where the surface goes on without
 /// them all along their rim. The parts on both sides of a wall become one when it goes. first: from first_copies.
-std::vector<std::uint8_t> triangles_of_walls(const Soup& soup, std::span<const Index> sorted,
-                                             std::span<const Index> first) {
+std::vector<std::uint8_t> triangles_of_walls(const Soup& soup, const IndexLists& edges, std::span<const Index> first) {
     const std::vector<Triangle>& triangles = soup.triangles;
     DisjointSets patches(triangles.size());
     std::vector<std::uint8_t> has_rim(triangles.size(), 0), is_loose(triangles.size(), 0);
     // twice: patches must be whole before what is found along them counts
     for (const bool joining : {true, false})
-        for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
+        for (const std::span<const Index> edge : edges) {
             std::size_t single_count = 0, doubled_count = 0, up_count = 0;
             Index doubled = kNoIndex;
             for (const Index h : edge) {
@@ -154,17 +154,17 @@ std::vector<std::uint8_t> triangles_of_walls(const Soup& soup, std::span<const I
                 if (first[t] != t) continue;
                 if (!soup.doubled[t]) {
                     ++single_count;
-                    up_count += half_edge_start(triangles, h) < half_edge_end(triangles, h);
+                    up_count += runs_up(triangles, h);
                     continue;
                 }
                 ++doubled_count;
                 if (joining && doubled != kNoIndex) patches.join(doubled, t);
                 doubled = t;
             }
-            if (joining || doubled == kNoIndex) return;
+            if (joining || doubled == kNoIndex) continue;
             if (single_count > 0) has_rim[patches.root(doubled)] = 1;
             if (2 * up_count != single_count || single_count + doubled_count == 1) is_loose[patches.root(doubled)] = 1;
-        });
+        }
     std::vector<std::uint8_t> of_wall(triangles.size(), 0);
     for (Index t = 0; t < triangles.size(); ++t) {
         const Index patch = patches.root(first[t]);
@@ -174,8 +174,8 @@ std::vector<std::uint8_t> triangles_of_walls(const Soup& soup, std::span<const I
 }
 
 /// Drops later copies, and walls altogether. Returns whether there were any.
-bool drop_duplicates(Soup& soup, std::span<const Index> sorted, CleanReport& report) {
-    const std::vector<Index> first = first_copies(soup.triangles, sorted);
+bool drop_duplicates(Soup& soup, const IndexLists& edges, CleanReport& report) {
+    const std::vector<Index> first = first_copies(soup.triangles, edges);
     const auto is_first = [&](std::size_t t) { return first[t] == t; };
     const std::size_t before = soup.triangles.size();
     bool any = false;
@@ -183,7 +183,7 @@ bool drop_duplicates(Soup& soup, std::span<const Index> sorted, CleanReport& rep
     if (!any) return false;
     std::ranges::fill(soup.doubled, 1); // turned by each copy
     for (const Index t : first) soup.doubled[t] ^= 1;
-    const std::vector<std::uint8_t> of_wall = triangles_of_walls(soup, sorted, first);
+    const std::vector<std::uint8_t> of_wall = triangles_of_walls(soup, edges, first);
     soup.filter([&](std::size_t t) { return is_first(t) && !of_wall[t]; });
     report.duplicate_faces += before - soup.triangles.size();
     return true;
@@ -198,25 +198,25 @@ std::span<const Index> sides_to_glue(const Soup& soup, std::span<const Index> ed
     for (const Index h : edge) {
         if (soup.doubled[h / 3]) continue;
         buffer.push_back(h);
-        up += half_edge_start(soup.triangles, h) < half_edge_end(soup.triangles, h);
+        up += runs_up(soup.triangles, h);
     }
     return !buffer.empty() && 2 * up == buffer.size() ? std::span<const Index>(buffer) : edge;
 }
 
 /// The opposite of each half-edge on edges with exactly two triangles, whichever way they run.
-std::vector<Index> pair_neighbours(const Soup& soup, std::span<const Index> sorted) {
-    std::vector<Index> neighbour(sorted.size(), kNoIndex), buffer;
-    for_each_edge(soup.triangles, sorted, [&](std::span<const Index> edge) {
+std::vector<Index> pair_neighbours(const Soup& soup, const IndexLists& edges) {
+    std::vector<Index> neighbour(edges.items.size(), kNoIndex), buffer;
+    for (const std::span<const Index> edge : edges) {
         const std::span<const Index> sides = sides_to_glue(soup, edge, buffer);
-        if (sides.size() != 2) return;
+        if (sides.size() != 2) continue;
         neighbour[sides[0]] = sides[1];
         neighbour[sides[1]] = sides[0];
-    });
+    }
     return neighbour;
 }
 
 /// Turns triangles over, and renumbers their half-edges: the edge i becomes the edge 2 - i.
-void flip_triangles(Soup& soup, std::span<Index> sorted, std::span<const std::uint8_t> flip, CleanReport& report) {
+void flip_triangles(Soup& soup, IndexLists& edges, std::span<const std::uint8_t> flip, CleanReport& report) {
     Index last_face = kNoIndex;
     for (std::size_t t = 0; t < flip.size(); ++t) {
         if (!flip[t]) continue;
@@ -225,23 +225,26 @@ void flip_triangles(Soup& soup, std::span<Index> sorted, std::span<const std::ui
         report.flipped_faces += soup.source_face[t] != last_face;
         last_face = soup.source_face[t];
     }
-    for (Index& h : sorted)
+    for (Index& h : edges.items)
         if (flip[h / 3]) h = h / 3 * 3 + 2 - h % 3;
 }
 
 /// Glues the half-edges of oriented triangles, so that their fans make a manifold.
 class Gluer {
 public:
-    Gluer(std::span<const Vec3d> positions, const Soup& soup, std::span<const Index> sorted)
-        : positions_(positions), triangles_(soup.triangles), opposite_(sorted.size(), kNoIndex) {
+    Gluer(std::span<const Vec3d> positions, const Soup& soup, const IndexLists& edges)
+        : positions_(positions), triangles_(soup.triangles), opposite_(edges.items.size(), kNoIndex) {
         std::vector<Index> buffer;
-        for_each_edge(soup.triangles, sorted, [&](std::span<const Index> edge) {
-            if (edge.size() == 2 && run_apart(edge[0], edge[1])) return glue(edge[0], edge[1]);
-            if (edge.size() < 2) return;
+        for (const std::span<const Index> edge : edges) {
+            if (edge.size() == 2 && run_apart(edge[0], edge[1])) {
+                glue(edge[0], edge[1]);
+                continue;
+            }
+            if (edge.size() < 2) continue;
             singular_.push_back(edge);
             pair_wedges(sides_to_glue(soup, edge, buffer));
             pair_wedges(edge); // what is still open: sheets that were there twice, among themselves
-        });
+        }
         if (!singular_.empty()) mend();
     }
 
@@ -276,7 +279,7 @@ private:
         around_.clear();
         for (const Index h : edge) {
             if (opposite_[h] != kNoIndex) continue;
-            const Vec3d arm = positions_[half_edge_start(triangles_, previous_half_edge(h))] - low;
+            const Vec3d arm = positions_[half_edge_apex(triangles_, h)] - low;
             around_.emplace_back(std::atan2(v.dot(arm), u.dot(arm)), h);
         }
         std::ranges::sort(around_);
@@ -397,8 +400,8 @@ Result<ManifoldSurface> make_manifold(const Mesh& mesh, CleanReport& report, con
     drop_degenerate(soup, report);
     if (!step(0.2)) return cancelled_error();
 
-    std::vector<Index> sorted = half_edges_by_edge(soup.triangles, mesh.vertex_count());
-    if (drop_duplicates(soup, sorted, report)) sorted = half_edges_by_edge(soup.triangles, mesh.vertex_count());
+    IndexLists edges = edges_of(soup.triangles, mesh.vertex_count());
+    if (drop_duplicates(soup, edges, report)) edges = edges_of(soup.triangles, mesh.vertex_count());
     std::vector<Vec3d> positions(mesh.vertex_count());
     std::ranges::transform(mesh.positions, positions.begin(), [](const Vec3f& p) { return p.cast<double>(); });
     const std::vector<double> areas = double_areas(positions, soup.triangles, context);
@@ -407,11 +410,10 @@ Result<ManifoldSurface> make_manifold(const Mesh& mesh, CleanReport& report, con
         return Error{ErrorCode::unsuitable, "The mesh has no face with an area; there is no surface to work on."};
     if (!step(0.5)) return cancelled_error();
 
-    const std::vector<Index> neighbour = pair_neighbours(soup, sorted);
-    flip_triangles(soup, sorted, triangles_to_turn(soup.triangles, neighbour, mesh.positions, OneSided::turned),
-                   report);
+    const std::vector<Index> neighbour = pair_neighbours(soup, edges);
+    flip_triangles(soup, edges, triangles_to_turn(soup.triangles, neighbour, mesh.positions, OneSided::turned), report);
     if (!step(0.7)) return cancelled_error();
-    const Gluer gluer(positions, soup, sorted);
+    const Gluer gluer(positions, soup, edges);
     const Labels fan = fans(gluer.opposite());
     const std::size_t used = used_count(soup.triangles, mesh.vertex_count());
     gluer.count(report);

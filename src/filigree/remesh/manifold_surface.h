@@ -52,7 +52,7 @@ struct SurfaceTopology {
 /// become one; a sheet that is there twice and meets a closed surface along some edges becomes a component of its own.
 /// Vertices and triangles keep the mesh's order.
 /// Adds to `report`. Errors: usage (check_mesh refuses the mesh), unsuitable (no face with an area is left; more
-/// triangles than kMostListedTriangles, see mesh/incidence.h), cancelled. Cost O(F log F).
+/// triangles than kMostListedTriangles, see mesh/edges.h), cancelled. Cost O(F log F).
 Result<ManifoldSurface> make_manifold(const Mesh& mesh, CleanReport& report, const RunContext& context);
 
 /// Cost O(F).

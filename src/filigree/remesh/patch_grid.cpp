@@ -1,9 +1,9 @@
 #include "filigree/remesh/patch_grid.h"
 
 #include "filigree/core/parallel_for.h"
+#include "filigree/mesh/edges.h"
 
 #include <algorithm>
-#include <unordered_map>
 
 namespace filigree {
 
@@ -22,18 +22,19 @@ struct Sides {
 };
 
 Sides number_sides(std::span<const std::array<Index, 4>> base) {
-    Sides sides;
-    std::unordered_map<std::uint64_t, std::size_t> ids;
-    ids.reserve(2 * base.size());
-    for (const std::array<Index, 4>& corners : base) {
-        auto& patch = sides.of_patch.emplace_back();
-        for (std::size_t k = 0; k < 4; ++k) {
-            const Index a = corners[k], b = corners[(k + 1) % 4];
-            const auto [entry, fresh] =
-                ids.try_emplace(std::uint64_t{std::min(a, b)} << 32 | std::max(a, b), sides.count);
-            sides.count += fresh;
-            patch[k] = {entry->second, a > b};
-        }
+    const auto corner = [&](Index h) { return base[h / 4][h % 4]; };
+    const auto end = [&](Index h) { return base[h / 4][(h + 1) % 4]; };
+    Index vertices = 0;
+    for (const std::array<Index, 4>& patch : base) vertices = std::max(vertices, std::ranges::max(patch) + 1);
+    std::vector<Index> first(4 * base.size()); // of each half-edge, the first of its edge
+    for (const std::span<const Index> edge : edges_from(vertices, [&](const auto& add) {
+             for (Index h = 0; h < first.size(); ++h) add(corner(h), end(h), h);
+         }))
+        for (const Index h : edge) first[h] = edge[0];
+    Sides sides{std::vector<std::array<Sides::Side, 4>>(base.size())};
+    for (Index h = 0; h < first.size(); ++h) {
+        const std::size_t id = first[h] == h ? sides.count++ : sides.of_patch[first[h] / 4][first[h] % 4].id;
+        sides.of_patch[h / 4][h % 4] = {id, corner(h) > end(h)};
     }
     return sides;
 }

@@ -2,6 +2,7 @@
 // both diagonals.
 #include "filigree/remesh/quad_quality.h"
 
+#include "filigree/core/lists.h"
 #include "filigree/core/parallel_for.h"
 
 #include <algorithm>
@@ -33,22 +34,11 @@ std::vector<double> scaled_jacobians(const Mesh& mesh, std::span<const Index> qu
     return result;
 }
 
-/// The quads at each vertex, one after the other: vertex v has quads[first[v]] .. quads[first[v + 1] - 1].
-struct QuadsAtVertices {
-    std::vector<Index> first, quads;
-};
-
-QuadsAtVertices quads_at_vertices(const Mesh& mesh, std::span<const Index> quads) {
-    QuadsAtVertices at;
-    at.first.assign(mesh.vertex_count() + 1, 0);
-    for (const Index q : quads)
-        for (const Index v : mesh.face(q)) ++at.first[v + 1];
-    for (std::size_t v = 0; v < mesh.vertex_count(); ++v) at.first[v + 1] += at.first[v];
-    at.quads.resize(at.first.back());
-    std::vector<Index> next(at.first.begin(), at.first.end() - 1);
-    for (const Index q : quads)
-        for (const Index v : mesh.face(q)) at.quads[next[v]++] = q;
-    return at;
+IndexLists quads_at_vertices(const Mesh& mesh, std::span<const Index> quads) {
+    return make_lists<Index>(mesh.vertex_count(), [&](const auto& add) {
+        for (const Index q : quads)
+            for (const Index v : mesh.face(q)) add(v, q);
+    });
 }
 
 /// Whether the vertex has other than four quads, and each of its edges exactly two of them.
@@ -70,13 +60,12 @@ bool is_irregular_inside(const Mesh& mesh, std::span<const Index> quads, Index v
 }
 
 std::size_t count_irregular_vertices(const Mesh& mesh, std::span<const Index> quads, const RunContext& context) {
-    const QuadsAtVertices at = quads_at_vertices(mesh, quads);
+    const IndexLists at = quads_at_vertices(mesh, quads);
     std::vector<std::size_t> of_piece((mesh.vertex_count() + kQuadQualityGrain - 1) / kQuadQualityGrain);
     parallel_for(context, mesh.vertex_count(), kQuadQualityGrain, [&](std::size_t begin, std::size_t end) {
         std::vector<Index> neighbours;
         for (std::size_t v = begin; v < end && !context.is_cancelled(); ++v) {
-            const auto around = std::span(at.quads).subspan(at.first[v], at.first[v + 1] - at.first[v]);
-            of_piece[begin / kQuadQualityGrain] += is_irregular_inside(mesh, around, static_cast<Index>(v), neighbours);
+            of_piece[begin / kQuadQualityGrain] += is_irregular_inside(mesh, at[v], static_cast<Index>(v), neighbours);
         }
     });
     std::size_t count = 0;

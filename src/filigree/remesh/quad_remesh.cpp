@@ -4,7 +4,7 @@
 #include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/closest_point.h"
-#include "filigree/mesh/half_edges.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/mesh/mesh_distance.h"
 #include "filigree/remesh/base_triangles.h"
 #include "filigree/remesh/feature_curves.h"

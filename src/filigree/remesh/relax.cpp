@@ -54,31 +54,22 @@ std::array<double, 4> corner_jacobians(const std::array<Vec3d, 4>& p) {
 /// Which quads each vertex has, and groups of vertices that share none.
 struct Neighbourhoods {
     std::vector<std::array<Index, 4>> quads;
-    std::vector<Index> offsets, of_vertex; ///< quads of vertex v: of_vertex[offsets[v]] ..
+    IndexLists around; ///< the quads at each vertex
     std::vector<std::vector<Index>> groups;
 
     explicit Neighbourhoods(const PatchGrid& grid) : quads(grid.quads()) {
-        const std::size_t vertex_count = grid.positions.size();
-        offsets.assign(vertex_count + 1, 0);
-        for (const auto& quad : quads)
-            for (const Index v : quad) ++offsets[v + 1];
-        for (std::size_t v = 0; v < vertex_count; ++v) offsets[v + 1] += offsets[v];
-        of_vertex.resize(offsets.back());
-        std::vector<Index> next(offsets.begin(), offsets.end() - 1);
-        for (Index q = 0; q < quads.size(); ++q)
-            for (const Index v : quads[q]) of_vertex[next[v]++] = q;
+        around = make_lists<Index>(grid.positions.size(), [&](const auto& add) {
+            for (Index q = 0; q < quads.size(); ++q)
+                for (const Index v : quads[q]) add(v, q);
+        });
         color();
     }
 
-    std::span<const Index> around(Index v) const {
-        return std::span(of_vertex).subspan(offsets[v], offsets[v + 1] - offsets[v]);
-    }
-
     void color() {
-        std::vector<std::uint8_t> colors(offsets.size() - 1, 255);
-        for (Index v = 0; v + 1 < offsets.size(); ++v) {
+        std::vector<std::uint8_t> colors(around.size(), 255);
+        for (Index v = 0; v < around.size(); ++v) {
             std::array<bool, 256> used = {};
-            for (const Index q : around(v))
+            for (const Index q : around[v])
                 for (const Index w : quads[q]) used[colors[w]] = true;
             std::uint8_t color = 0;
             while (used[color]) ++color;
@@ -161,17 +152,17 @@ public:
     void centre(Index v) {
         if (grid_.kinds[v] != VertexKind::inside || grid_.held[v] > 0) return;
         Vec3d sum = Vec3d::Zero();
-        for (const Index q : near_.around(v)) {
+        for (const Index q : near_.around[v]) {
             const auto& quad = near_.quads[q];
             const int k = quad[0] == v ? 0 : quad[1] == v ? 1 : quad[2] == v ? 2 : 3;
             sum += 0.5 * (grid_.positions[quad[(k + 1) % 4]] + grid_.positions[quad[(k + 3) % 4]]);
         }
-        accept(v, move(v, sum / double(near_.around(v).size())));
+        accept(v, move(v, sum / double(near_.around[v].size())));
     }
 
     double worst(Index v, const Vec3d& place) const {
         double least = 1;
-        for (const Index q : near_.around(v))
+        for (const Index q : near_.around[v])
             for (const double jacobian : corner_jacobians(corners(near_.quads[q], v, place)))
                 least = std::min(least, jacobian);
         return least;
@@ -181,7 +172,7 @@ public:
     /// so that a quad with several things wrong can be mended one at a time.
     double badness(Index v, const Vec3d& place) const {
         double sum = 0;
-        for (const Index q : near_.around(v)) {
+        for (const Index q : near_.around[v]) {
             for (const double jacobian : corner_jacobians(corners(near_.quads[q], v, place))) {
                 const double lack = std::max(0.0, kGoodEnough - jacobian);
                 sum += lack * lack * lack * lack;
@@ -230,7 +221,7 @@ private:
         Vec3d sum = Vec3d::Zero();
         double areas = 0;
         edge = 0;
-        const std::span<const Index> around = near_.around(v);
+        const std::span<const Index> around = near_.around[v];
         for (const Index q : around) {
             const auto& quad = near_.quads[q];
             const int k = quad[0] == v ? 0 : quad[1] == v ? 1 : quad[2] == v ? 2 : 3;
@@ -247,7 +238,7 @@ private:
 
     Vec3d quad_normal(Index v) const {
         Vec3d sum = Vec3d::Zero();
-        for (const Index q : near_.around(v)) sum += normal_of(near_.quads[q], kNoIndex, Vec3d::Zero());
+        for (const Index q : near_.around[v]) sum += normal_of(near_.quads[q], kNoIndex, Vec3d::Zero());
         const double length = sum.norm();
         return length > 0 ? Vec3d(sum / length) : Vec3d::UnitZ();
     }
@@ -259,7 +250,7 @@ private:
 
     /// Whether one of the quads would face the other way.
     bool is_turned(Index v, const Vec3d& place) const {
-        for (const Index q : near_.around(v))
+        for (const Index q : near_.around[v])
             if (normal_of(near_.quads[q], v, place).dot(normal_of(near_.quads[q], kNoIndex, place)) < 0) return true;
         return false;
     }
@@ -354,7 +345,7 @@ private:
         sort_once_each();
         for (int ring = 0; ring < rings; ++ring) {
             for (std::size_t i = 0, end = vertices.size(); i < end; ++i)
-                for (const Index q : near_.around(vertices[i]))
+                for (const Index q : near_.around[vertices[i]])
                     vertices.insert(vertices.end(), near_.quads[q].begin(), near_.quads[q].end());
             sort_once_each();
         }

@@ -87,7 +87,7 @@ bool SurfaceMap::are_neighbours(Index a, Index b) const {
     Index h = out_[a];
     do {
         if (to(h) == b) return true;
-        const Index p = previous(h);
+        const Index p = previous_half_edge(h);
         if (is_border(p)) return from(p) == b;
         h = twin_[p];
     } while (h != out_[a]);
@@ -98,14 +98,14 @@ std::size_t SurfaceMap::sector_size(Index half_edge) const {
     if (kind_[from(half_edge)] == VertexKind::inside) return valence_[from(half_edge)];
     std::size_t size = 1;
     Index h = half_edge;
-    while (!is_feature(previous(h)) && size < kMostCounted) { // counter-clockwise
-        h = twin_[previous(h)];
+    while (!is_feature(previous_half_edge(h)) && size < kMostCounted) { // counter-clockwise
+        h = twin_[previous_half_edge(h)];
         if (h == half_edge) return size;
         ++size;
     }
     h = half_edge;
     while (!is_feature(h) && size < kMostCounted) {
-        h = next(twin_[h]);
+        h = next_half_edge(twin_[h]);
         ++size;
     }
     return size;
@@ -113,16 +113,16 @@ std::size_t SurfaceMap::sector_size(Index half_edge) const {
 
 double SurfaceMap::corner_angle(Index half_edge) const {
     const Vec3d& p = positions_[from(half_edge)];
-    const Vec3d a = positions_[to(half_edge)] - p, b = positions_[from(previous(half_edge))] - p;
+    const Vec3d a = positions_[to(half_edge)] - p, b = positions_[from(previous_half_edge(half_edge))] - p;
     return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
 double SurfaceMap::sector_angle(Index half_edge) const {
     Index h = half_edge;
-    while (!is_feature(h)) h = next(twin_[h]);
+    while (!is_feature(h)) h = next_half_edge(twin_[h]);
     double angle = corner_angle(h);
-    while (!is_feature(previous(h))) {
-        h = twin_[previous(h)];
+    while (!is_feature(previous_half_edge(h))) {
+        h = twin_[previous_half_edge(h)];
         angle += corner_angle(h);
     }
     return angle;
@@ -142,7 +142,7 @@ void SurfaceMap::star(Index vertex, Star& star) const {
         if (is_feature(h) && curves < 2) curve[curves++] = star.ring.size();
         star.half_edges.push_back(h);
         star.ring.push_back(to(h));
-        const Index p = previous(h);
+        const Index p = previous_half_edge(h);
         if (is_border(p)) {
             star.open = true;
             if (curves < 2) curve[curves++] = star.ring.size();
@@ -226,8 +226,8 @@ std::array<std::uint8_t, 3> SurfaceMap::star_corners(const Star& star, std::size
     const Index h = star.half_edges[i];
     std::array<std::uint8_t, 3> local;
     local[h % 3] = static_cast<std::uint8_t>(star.ring.size());
-    local[next(h) % 3] = static_cast<std::uint8_t>(i);
-    local[previous(h) % 3] = static_cast<std::uint8_t>(star.next(i));
+    local[next_half_edge(h) % 3] = static_cast<std::uint8_t>(i);
+    local[previous_half_edge(h) % 3] = static_cast<std::uint8_t>(star.next(i));
     return local;
 }
 
@@ -310,7 +310,7 @@ void SurfaceMap::collapse(const Star& star, std::size_t target) {
         // half-edges that leave the apex and v along the edge that is left; kept only where theirs has gone
         for (const Index outer : {outer_u, outer_v}) {
             if (outer == kNoIndex) continue;
-            for (const Index leaving : {outer, next(outer)}) {
+            for (const Index leaving : {outer, next_half_edge(outer)}) {
                 const Index vertex = from(leaving);
                 if (vertex == apex && out_[apex] / 3 == slot) out_[apex] = leaving;
                 if (vertex == v) start = leaving;
@@ -327,7 +327,7 @@ void SurfaceMap::collapse(const Star& star, std::size_t target) {
     // on borders the first, counter-clockwise: clockwise until there is no further
     const auto to_border = [&](Index vertex) {
         if (!on_border_[vertex]) return;
-        while (!is_border(out_[vertex])) out_[vertex] = next(twin_[out_[vertex]]);
+        while (!is_border(out_[vertex])) out_[vertex] = next_half_edge(twin_[out_[vertex]]);
     };
     to_border(v);
     const std::size_t n = star.ring.size();
@@ -347,8 +347,8 @@ TrianglePoint SurfaceMap::locate(const Star& star, const Vec2f& place) const {
         const Index h = star.half_edges[i];
         found.triangle = h / 3;
         found.barycentric[h % 3] = weights[0];
-        found.barycentric[next(h) % 3] = weights[1];
-        found.barycentric[previous(h) % 3] = weights[2];
+        found.barycentric[next_half_edge(h) % 3] = weights[1];
+        found.barycentric[previous_half_edge(h) % 3] = weights[2];
     }
     found.barycentric = found.barycentric.cwiseMax(0.0);
     found.barycentric /= found.barycentric.sum();
@@ -388,7 +388,7 @@ SurfaceMap::Unfolded SurfaceMap::unfold(Index half_edge) const {
     }
     const Vec3d direction = along / length;
     const auto place = [&](Index half, double sign) {
-        const Vec3d arm = positions_[from(previous(half))] - origin;
+        const Vec3d arm = positions_[from(previous_half_edge(half))] - origin;
         const double x = arm.dot(direction);
         const double y = std::max((arm - x * direction).norm(), kSmallestHeight * length);
         return Vec2d(x / length, sign * y / length).cast<float>().eval();
@@ -399,7 +399,8 @@ SurfaceMap::Unfolded SurfaceMap::unfold(Index half_edge) const {
 
 void SurfaceMap::flip(Index half_edge) {
     const Index other = twin_[half_edge], s = half_edge / 3, t = other / 3;
-    const Index a = from(half_edge), b = to(half_edge), c = from(previous(half_edge)), d = from(previous(other));
+    const Index a = from(half_edge), b = to(half_edge), c = from(previous_half_edge(half_edge)),
+                d = from(previous_half_edge(other));
     const Unfolded flat = unfold(half_edge);
     begin_record(4);
     const std::size_t points = records_.back().points;
@@ -411,10 +412,10 @@ void SurfaceMap::flip(Index half_edge) {
     add_old(s, corners(s));
     add_old(t, corners(t));
     const double covered = covered_[s] + covered_[t];
-    const Index bc = twin_[next(half_edge)], ca = twin_[previous(half_edge)];
-    const Index ad = twin_[next(other)], db = twin_[previous(other)];
-    const bool bc_feature = feature_[next(half_edge)], ca_feature = feature_[previous(half_edge)];
-    const bool ad_feature = feature_[next(other)], db_feature = feature_[previous(other)];
+    const Index bc = twin_[next_half_edge(half_edge)], ca = twin_[previous_half_edge(half_edge)];
+    const Index ad = twin_[next_half_edge(other)], db = twin_[previous_half_edge(other)];
+    const bool bc_feature = feature_[next_half_edge(half_edge)], ca_feature = feature_[previous_half_edge(half_edge)];
+    const bool ad_feature = feature_[next_half_edge(other)], db_feature = feature_[previous_half_edge(other)];
     triangles_[s] = {c, a, d};
     triangles_[t] = {d, b, c};
     link(3 * s, ca, ca_feature);
@@ -438,7 +439,7 @@ void SurfaceMap::flip(Index half_edge) {
         if (from(old) == vertex && old / 3 != s && old / 3 != t) return; // untouched, and first already
         out_[vertex] = candidate;
         if (!on_border_[vertex]) return;
-        while (!is_border(out_[vertex])) out_[vertex] = next(twin_[out_[vertex]]);
+        while (!is_border(out_[vertex])) out_[vertex] = next_half_edge(twin_[out_[vertex]]);
     };
     leave(a, 3 * s + 1);
     leave(b, 3 * t + 1);
@@ -448,14 +449,14 @@ void SurfaceMap::flip(Index half_edge) {
 
 Index SurfaceMap::split(Index half_edge, double share) {
     const Index other = twin_[half_edge];
-    const Index a = from(half_edge), b = to(half_edge), c = from(previous(half_edge));
-    const Index d = other == kNoIndex ? kNoIndex : from(previous(other));
+    const Index a = from(half_edge), b = to(half_edge), c = from(previous_half_edge(half_edge));
+    const Index d = other == kNoIndex ? kNoIndex : from(previous_half_edge(other));
     const bool feature = is_feature(half_edge);
     const Unfolded flat = unfold(half_edge);
     const Index m = static_cast<Index>(positions_.size());
     TrianglePoint middle{half_edge / 3, Vec3d::Zero()};
     middle.barycentric[half_edge % 3] = 1 - share;
-    middle.barycentric[next(half_edge) % 3] = share;
+    middle.barycentric[next_half_edge(half_edge) % 3] = share;
     positions_.push_back(original_position(trace(middle)));
     kind_.push_back(feature ? VertexKind::curve : VertexKind::inside);
     on_border_.push_back(other == kNoIndex);
@@ -475,7 +476,7 @@ Index SurfaceMap::split(Index half_edge, double share) {
 
     // Each old triangle (x, y, apex) becomes (x, m, apex) in its slot and (m, y, apex) in a new one.
     const auto halve = [&](Index h, double first_share) {
-        const Index slot = h / 3, y = to(h), apex = from(previous(h)), far = next(h);
+        const Index slot = h / 3, y = to(h), apex = from(previous_half_edge(h)), far = next_half_edge(h);
         const Index fresh = static_cast<Index>(triangles_.size());
         const Index far_twin = twin_[far];
         const bool far_feature = feature_[far];
@@ -485,7 +486,7 @@ Index SurfaceMap::split(Index half_edge, double share) {
         face_.push_back(kNoIndex);
         covered_.push_back(covered_[slot] * (1 - first_share));
         covered_[slot] *= first_share;
-        triangles_[slot][next(h) % 3] = m;
+        triangles_[slot][next_half_edge(h) % 3] = m;
         link(3 * fresh + 1, far_twin, far_feature);
         link(far, 3 * fresh + 2, false);
         ++valence_[apex];

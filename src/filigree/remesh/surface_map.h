@@ -2,7 +2,7 @@
 // changed, every point of it knows its place on the surface it began as.
 #pragma once
 
-#include "filigree/mesh/half_edges.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/remesh/manifold_surface.h"
 
 #include <cstdint>
@@ -65,9 +65,7 @@ public:
     Index twin(Index half_edge) const { return twin_[half_edge]; }
     bool is_feature(Index half_edge) const { return feature_[half_edge] != 0; } ///< borders too
     Index from(Index half_edge) const { return triangles_[half_edge / 3][half_edge % 3]; }
-    Index to(Index half_edge) const { return from(next(half_edge)); }
-    static Index next(Index half_edge) { return next_half_edge(half_edge); }
-    static Index previous(Index half_edge) { return previous_half_edge(half_edge); }
+    Index to(Index half_edge) const { return from(next_half_edge(half_edge)); }
     /// A half-edge that leaves the vertex; on borders the first, counter-clockwise.
     Index out(Index vertex) const { return out_[vertex]; }
     double area(Index slot) const;

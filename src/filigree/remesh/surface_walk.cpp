@@ -85,14 +85,14 @@ SurfaceWalk::Place SurfaceWalk::walk(const TrianglePoint& start, const Vec3d& ta
         } else if (zeros == 2) {
             const Index corner = b[0] > 0 ? 0 : b[1] > 0 ? 1 : 2, first = 3 * triangle + corner;
             Index h = first;
-            for (int i = 0; i < kMostAround && !features_[SurfaceMap::previous(h)]; ++i) { // counter-clockwise
-                h = twins_[SurfaceMap::previous(h)];
+            for (int i = 0; i < kMostAround && !features_[previous_half_edge(h)]; ++i) { // counter-clockwise
+                h = twins_[previous_half_edge(h)];
                 if (h == first) break;
                 try_triangle(h / 3);
             }
             if (h != first)
                 for (Index g = first, i = 0; i < kMostAround && !features_[g]; ++i) {
-                    g = SurfaceMap::next(twins_[g]);
+                    g = next_half_edge(twins_[g]);
                     try_triangle(g / 3);
                 }
         }
@@ -118,7 +118,7 @@ Index SurfaceWalk::curve_at(const TrianglePoint& point) const {
     const Index first = 3 * point.triangle + corner;
     for (Index h = first;;) {
         if (features_[h]) return h;
-        const Index p = SurfaceMap::previous(h);
+        const Index p = previous_half_edge(h);
         if (features_[p]) return p;
         h = twins_[p];
         if (h == first) break;
@@ -133,8 +133,8 @@ Index SurfaceWalk::curve_at(const TrianglePoint& point) const {
 Index SurfaceWalk::onward(Index half_edge) const {
     const Index vertex = to(half_edge);
     if (kinds_[vertex] != VertexKind::curve) return kNoIndex;
-    Index h = SurfaceMap::next(half_edge);
-    while (!features_[h]) h = SurfaceMap::next(twins_[h]); // clockwise: the far side of this sector
+    Index h = next_half_edge(half_edge);
+    while (!features_[h]) h = next_half_edge(twins_[h]); // clockwise: the far side of this sector
     return h;
 }
 
@@ -154,7 +154,7 @@ SurfaceWalk::Place SurfaceWalk::slide(const TrianglePoint& start, const Vec3d& t
             best.position = p;
             best.point = {h / 3, Vec3d::Zero()};
             best.point.barycentric[h % 3] = 1 - inside;
-            best.point.barycentric[SurfaceMap::next(h) % 3] = inside;
+            best.point.barycentric[next_half_edge(h) % 3] = inside;
         }
         return t;
     };
@@ -171,8 +171,8 @@ SurfaceWalk::Place SurfaceWalk::slide(const TrianglePoint& start, const Vec3d& t
         for (int i = 0; i < kMostWalkSteps; ++i) {
             const Index vertex = from(h);
             if (kinds_[vertex] != VertexKind::curve) break;
-            Index g = SurfaceMap::previous(h);
-            while (!features_[g]) g = SurfaceMap::previous(twins_[g]);
+            Index g = previous_half_edge(h);
+            while (!features_[g]) g = previous_half_edge(twins_[g]);
             h = g; // ends where the last one began
             if (h == first || project(h) >= 0) break;
         }

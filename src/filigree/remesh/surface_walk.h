@@ -33,7 +33,7 @@ public:
 
 private:
     Index from(Index h) const { return surface_.triangles[h / 3][h % 3]; }
-    Index to(Index h) const { return from(SurfaceMap::next(h)); }
+    Index to(Index h) const { return from(next_half_edge(h)); }
     Index curve_at(const TrianglePoint& point) const;
     Index onward(Index half_edge) const;
 

@@ -3,6 +3,7 @@
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/closest_point.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/mesh/triangulate.h"
 #include "filigree/mesh/weld.h"
 
@@ -31,15 +32,18 @@ Vec3d to_double(const Vec3f& p) { return p.cast<double>(); }
 struct InputSurface {
     const Mesh& mesh;
     std::vector<Triangle> corners; ///< of each triangle
-    std::vector<Index> face_of_corner;
+    PolygonCorners polygons;
     /// Half-edge 3 t + i runs from corner i of triangle t to the next. The next half-edge between the same positions
     /// (the other one, where there are two); kNoIndex on borders.
     std::vector<Index> beyond;
     std::vector<Index> place; ///< of each vertex
 
-    InputSurface(const Mesh& from, const Triangulation& cut) : mesh(from), place(weld_map(from.positions)) {
+    InputSurface(const Mesh& from, const Triangulation& cut)
+        : mesh(from), polygons(from.face_offsets), place(weld_map(from.positions)) {
         take_faces(cut);
-        sort_by_middle();
+        at_middle_ = make_lists<Index>(mesh.corner_count(), [&](const auto& add) {
+            for (Index t = 0; t < corners.size(); ++t) add(middle_corner(corners[t]), t);
+        });
         join_edges();
     }
 
@@ -56,10 +60,9 @@ struct InputSurface {
 
     /// The triangle that has the point, or the first of its face.
     Index triangle_of(const CornerPoint& point) const {
-        const Index middle = middle_corner(point.corners);
-        for (Index i = first_at_middle_[middle]; i < first_at_middle_[middle + 1]; ++i)
-            if (std::ranges::is_permutation(corners[at_middle_[i]], point.corners)) return at_middle_[i];
-        return first_triangle_[face_of_corner[point.corners[0]]];
+        for (const Index t : at_middle_[middle_corner(point.corners)])
+            if (std::ranges::is_permutation(corners[t], point.corners)) return t;
+        return first_triangle_[polygons.face(point.corners[0])];
     }
 
 private:
@@ -68,9 +71,6 @@ private:
     }
 
     void take_faces(const Triangulation& cut) {
-        face_of_corner.resize(mesh.corner_count());
-        for (std::size_t f = 0; f < mesh.face_count(); ++f)
-            for (Index c = mesh.face_offsets[f]; c < mesh.face_offsets[f + 1]; ++c) face_of_corner[c] = Index(f);
         first_triangle_.assign(mesh.face_count() + 1, 0);
         for (const Index face : cut.source_face) ++first_triangle_[face + 1];
         for (std::size_t f = 0; f < mesh.face_count(); ++f) first_triangle_[f + 1] += first_triangle_[f];
@@ -85,39 +85,22 @@ private:
         }
     }
 
-    void sort_by_middle() {
-        first_at_middle_.assign(mesh.corner_count() + 1, 0);
-        for (const Triangle& t : corners) ++first_at_middle_[middle_corner(t) + 1];
-        for (std::size_t c = 0; c < mesh.corner_count(); ++c) first_at_middle_[c + 1] += first_at_middle_[c];
-        at_middle_.resize(corners.size());
-        std::vector<Index> next(first_at_middle_.begin(), first_at_middle_.end() - 1);
-        for (Index t = 0; t < corners.size(); ++t) at_middle_[next[middle_corner(corners[t])]++] = t;
-    }
-
     void join_edges() {
-        struct Edge {
-            Index low, high, half_edge;
-        };
-        std::vector<Edge> edges;
-        edges.reserve(3 * corners.size());
-        for (Index h = 0; h < 3 * corners.size(); ++h) {
-            const Index a = place_of(corners[h / 3][h % 3]), b = place_of(corners[h / 3][(h + 1) % 3]);
-            if (a != b) edges.push_back({std::min(a, b), std::max(a, b), h});
-        }
-        std::ranges::sort(edges, {}, [](const Edge& e) { return std::tuple(e.low, e.high, e.half_edge); });
+        const auto start = [&](Index t, Index k) { return place_of(corners[t][k % 3]); };
+        const IndexLists edges = edges_from(mesh.vertex_count(), [&](const auto& add) {
+            for (Index h = 0; h < 3 * corners.size(); ++h)
+                if (const Index a = start(h / 3, h % 3), b = start(h / 3, h % 3 + 1); a != b) add(a, b, h);
+        });
         beyond.assign(3 * corners.size(), kNoIndex);
-        for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
-            while (end < edges.size() && edges[end].low == edges[begin].low && edges[end].high == edges[begin].high)
-                ++end;
-            for (std::size_t i = begin; i < end && end - begin > 1; ++i)
-                beyond[edges[i].half_edge] = edges[i + 1 < end ? i + 1 : begin].half_edge;
-        }
+        for (const std::span<const Index> edge : edges)
+            for (std::size_t i = 0; i < edge.size() && edge.size() > 1; ++i)
+                beyond[edge[i]] = edge[i + 1 < edge.size() ? i + 1 : 0];
     }
 
     std::vector<Index> first_triangle_; ///< of each face, and the count of all
     /// Triangles by their middle corner, of the three in order: each corner of a face but the first and the last is the
-    /// middle of one triangle. Corner c has at_middle_[first_at_middle_[c]] .. at_middle_[first_at_middle_[c + 1] - 1].
-    std::vector<Index> first_at_middle_, at_middle_;
+    /// middle of one triangle.
+    IndexLists at_middle_;
 };
 
 /// Whether each half-edge is a seam: whether `same(corner, corner)` fails at one of its ends.
@@ -550,7 +533,7 @@ CornerAttribute<Vec3f> transfer_normals(const Placement& placement, const RunCon
 std::vector<Index> faces_under(const Placement& placement, const RunContext& context) {
     const Mesh& from = placement.surface.mesh;
     const auto same = [&](Index c, Index d) {
-        const Index f = placement.surface.face_of_corner[c], g = placement.surface.face_of_corner[d];
+        const Index f = placement.surface.polygons.face(c), g = placement.surface.polygons.face(d);
         for (const FaceLabels* labels : {&from.objects, &from.groups, &from.materials})
             if (!labels->empty() && labels->of_face[f] != labels->of_face[g]) return false;
         return from.smoothing.empty() || from.smoothing[f] == from.smoothing[g];
@@ -564,7 +547,7 @@ std::vector<Index> faces_under(const Placement& placement, const RunContext& con
             const auto known = std::ranges::find_if(face, [&](Index v) { return placement.triangles[v] != kNoIndex; });
             const Index triangle = !grid.empty() && grid.near(placement.spots[f]) ? triangle_under_centre(placement, f)
                                                                                   : placement.triangles[*known];
-            faces[f] = placement.surface.face_of_corner[placement.surface.corners[triangle][0]];
+            faces[f] = placement.surface.polygons.face(placement.surface.corners[triangle][0]);
         }
     });
     return faces;

@@ -6,6 +6,7 @@
 #include "filigree/remesh/voxel_wrap.h"
 
 #include "filigree/core/disjoint_sets.h"
+#include "filigree/core/lists.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/remesh/voxel_grid.h"
@@ -14,7 +15,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <numeric>
 #include <optional>
 
 namespace filigree {
@@ -154,35 +154,18 @@ void mark_triangle(const Polygon& triangle, int low, int high, Touched& touched,
     }
 }
 
-/// The triangles that reach into each slab of layers: slab s has triangles[first[s]] .. triangles[first[s + 1] - 1].
-struct SlabTriangles {
-    std::vector<std::size_t> first;
-    std::vector<Index> triangles;
-};
-
-SlabTriangles sort_into_slabs(std::span<const Vec3d> positions, std::span<const Triangle> triangles, int layer_count) {
+/// The triangles that reach into each slab of layers.
+Lists<Index, std::size_t> sort_into_slabs(std::span<const Vec3d> positions, std::span<const Triangle> triangles,
+                                          int layer_count) {
     const std::size_t slabs = (std::size_t(layer_count) + kSlab - 1) / kSlab;
-    const auto range = [&](const Triangle& t) {
-        const auto [low, high] = std::minmax({positions[t[0]].z(), positions[t[1]].z(), positions[t[2]].z()});
-        const auto slab = [&](double z) {
-            return std::min(slabs - 1, std::size_t(std::max(0.0, std::floor(z))) / kSlab);
-        };
-        return std::pair(slab(low - kTouch), slab(high + kTouch));
-    };
-    SlabTriangles sorted;
-    sorted.first.assign(slabs + 1, 0);
-    for (const Triangle& t : triangles) {
-        const auto [low, high] = range(t);
-        for (std::size_t s = low; s <= high; ++s) ++sorted.first[s + 1];
-    }
-    std::partial_sum(sorted.first.begin(), sorted.first.end(), sorted.first.begin());
-    sorted.triangles.resize(sorted.first.back());
-    std::vector<std::size_t> next(sorted.first.begin(), sorted.first.end() - 1);
-    for (Index t = 0; t < triangles.size(); ++t) {
-        const auto [low, high] = range(triangles[t]);
-        for (std::size_t s = low; s <= high; ++s) sorted.triangles[next[s]++] = t;
-    }
-    return sorted;
+    const auto slab = [&](double z) { return std::min(slabs - 1, std::size_t(std::max(0.0, std::floor(z))) / kSlab); };
+    return make_lists<Index, std::size_t>(slabs, [&](const auto& add) {
+        for (Index t = 0; t < triangles.size(); ++t) {
+            const auto& [a, b, c] = triangles[t];
+            const auto [low, high] = std::minmax({positions[a].z(), positions[b].z(), positions[c].z()});
+            for (std::size_t s = slab(low - kTouch); s <= slab(high + kTouch); ++s) add(s, t);
+        }
+    });
 }
 
 /// Marks what the triangles touch, and finds what the wrap will be pulled onto. positions: in voxels.
@@ -192,13 +175,12 @@ VoxelGrid touched_voxels(std::span<const Vec3d> positions, std::span<const Trian
     const auto polygon = [&](const Triangle& t) {
         return Polygon{{positions[t[0]], positions[t[1]], positions[t[2]]}, 3};
     };
-    const SlabTriangles slabs = sort_into_slabs(positions, triangles, size[2]);
-    std::vector<PullTarget> pieces(slabs.first.size() - 1); // of each slab
+    const Lists<Index, std::size_t> slabs = sort_into_slabs(positions, triangles, size[2]);
+    std::vector<PullTarget> pieces(slabs.size()); // of each slab
     parallel_for(context, pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t s = begin; s < end && !context.is_cancelled(); ++s) {
             const int low = int(s * kSlab), high = std::min(low + int(kSlab), size[2]) - 1;
-            for (std::size_t i = slabs.first[s]; i < slabs.first[s + 1]; ++i)
-                mark_triangle(polygon(triangles[slabs.triangles[i]]), low, high, touched, pieces[s]);
+            for (const Index t : slabs[s]) mark_triangle(polygon(triangles[t]), low, high, touched, pieces[s]);
         }
     });
     for (const Vec3d& p : positions) target.positions.push_back(p.cast<float>());
@@ -280,27 +262,13 @@ QuadSurface extract_border(const VoxelGrid& solid) {
     return surface;
 }
 
-/// The neighbours of each vertex along edges: vertex v has ends[first[v]] .. ends[first[v + 1] - 1].
-struct VoxelNeighbours {
-    std::vector<Index> first, ends;
-    std::span<const Index> of(std::size_t v) const {
-        return std::span(ends).subspan(first[v], first[v + 1] - first[v]);
-    }
-};
-
-/// Each edge of a closed surface is left once from each end.
+/// The neighbours of each vertex along edges. Each edge of a closed surface is left once from each end.
 template <class Face>
-VoxelNeighbours find_neighbours(std::span<const Face> faces, std::size_t vertex_count) {
-    VoxelNeighbours neighbours;
-    neighbours.first.assign(vertex_count + 1, 0);
-    for (const Face& face : faces)
-        for (const Index v : face) ++neighbours.first[v + 1];
-    std::partial_sum(neighbours.first.begin(), neighbours.first.end(), neighbours.first.begin());
-    neighbours.ends.resize(neighbours.first.back());
-    std::vector<Index> next(neighbours.first.begin(), neighbours.first.end() - 1);
-    for (const Face& face : faces)
-        for (std::size_t k = 0; k < face.size(); ++k) neighbours.ends[next[face[k]]++] = face[(k + 1) % face.size()];
-    return neighbours;
+IndexLists find_neighbours(std::span<const Face> faces, std::size_t vertex_count) {
+    return make_lists<Index>(vertex_count, [&](const auto& add) {
+        for (const Face& face : faces)
+            for (std::size_t k = 0; k < face.size(); ++k) add(face[k], face[(k + 1) % face.size()]);
+    });
 }
 
 Vec3d mean_of(std::span<const Index> vertices, std::span<const Vec3d> positions) {
@@ -312,13 +280,13 @@ Vec3d mean_of(std::span<const Index> vertices, std::span<const Vec3d> positions)
 /// Takes the steps off, each vertex within its own box.
 void smooth_steps(QuadSurface& surface, const RunContext& context) {
     const std::vector<Vec3d> corners = surface.positions;
-    const VoxelNeighbours neighbours =
+    const IndexLists neighbours =
         find_neighbours(std::span<const std::array<Index, 4>>(surface.quads), surface.positions.size());
     std::vector<Vec3d> moved(corners.size());
     for (int round = 0; round < kSmoothRounds; ++round) {
         parallel_for(context, corners.size(), kVoxelWrapGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t v = begin; v < end && !context.is_cancelled(); ++v)
-                moved[v] = mean_of(neighbours.of(v), surface.positions)
+                moved[v] = mean_of(neighbours[v], surface.positions)
                                .cwiseMax(corners[v] - Vec3d::Constant(kFreedom))
                                .cwiseMin(corners[v] + Vec3d::Constant(kFreedom));
         });
@@ -413,11 +381,11 @@ std::vector<Vec3d> pull_targets(const ClosestPointTree& tree, const VoxelGrid& s
 
 /// Each vertex to the middle of its neighbours, along the surface.
 std::vector<Vec3d> tangential_targets(std::span<const Vec3d> positions, std::span<const Vec3d> normals,
-                                      const VoxelNeighbours& neighbours, const RunContext& context) {
+                                      const IndexLists& neighbours, const RunContext& context) {
     std::vector<Vec3d> targets(positions.size());
     parallel_for(context, positions.size(), kVoxelWrapGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v) {
-            const Vec3d offset = mean_of(neighbours.of(v), positions) - positions[v];
+            const Vec3d offset = mean_of(neighbours[v], positions) - positions[v];
             targets[v] = positions[v] + 0.5 * (offset - offset.dot(normals[v]) * normals[v]);
         }
     });
@@ -428,7 +396,7 @@ void pull_onto_input(const PullTarget& input, const VoxelGrid& solid, std::span<
                      std::vector<Vec3d>& positions, const RunContext& context) {
     std::optional<ClosestPointTree> tree; // Embree builds on the threads of the arena it is called in
     context.execute([&] { tree.emplace(input.positions, input.triangles); });
-    const VoxelNeighbours neighbours = find_neighbours(triangles, positions.size());
+    const IndexLists neighbours = find_neighbours(triangles, positions.size());
     for (int round = 0; round < kPullRounds && !context.is_cancelled(); ++round) {
         context.report("pulling the wrap onto the surface", double(round) / kPullRounds);
         std::vector<Vec3d> normals = unit_normals(positions, triangles);

@@ -1,7 +1,7 @@
 // Moving a camera by a pointer: zoom about a point, the way to another camera, what a pixel is worth and points at.
 #pragma once
 
-#include "filigree/render/camera.h"
+#include "filigree/render.h"
 
 #include <optional>
 

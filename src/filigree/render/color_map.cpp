@@ -1,6 +1,6 @@
 // Based on: [Ottosson 2020], OKLab, a space where distances are how different two colours look. Both maps are Bezier
 // curves there, walked at constant speed.
-#include "filigree/render/color_map.h"
+#include "filigree/render.h"
 
 #include <algorithm>
 #include <array>

@@ -39,21 +39,10 @@ std::vector<Vec3f> face_areas(const Mesh& mesh, std::span<const Vec3f> positions
 
 Vec3f unit(const Vec3f& v) { return v.cast<double>().stableNormalized().cast<float>(); }
 
-/// Corners by the place of their vertex.
-struct CornersAt {
-    std::vector<Index> offsets; ///< per place
-    std::vector<Index> corners;
-};
-
-CornersAt corners_at_places(const Mesh& mesh, std::span<const Index> place) {
-    CornersAt at;
-    at.offsets.assign(place.size() + 1, 0);
-    for (Index v : mesh.corners) ++at.offsets[place[v] + 1];
-    std::partial_sum(at.offsets.begin(), at.offsets.end(), at.offsets.begin());
-    std::vector<Index> next(at.offsets.begin(), at.offsets.end() - 1);
-    at.corners.resize(mesh.corner_count());
-    for (Index c = 0; c < mesh.corner_count(); ++c) at.corners[next[place[mesh.corners[c]]]++] = c;
-    return at;
+IndexLists corners_at_places(const Mesh& mesh, std::span<const Index> place) {
+    return make_lists<Index>(place.size(), [&](const auto& add) {
+        for (Index c = 0; c < mesh.corner_count(); ++c) add(place[mesh.corners[c]], c);
+    });
 }
 
 /// Normals of the corners at one place.
@@ -70,7 +59,6 @@ public:
     /// faces: the face of each corner.
     void at(std::span<const Index> corners, std::span<const Index> faces, std::vector<Vec3f>& normals) {
         normals.resize(corners.size());
-        is_smooth_ = true;
         if (shading_ == Shading::automatic && !mesh_.normals.empty()) {
             for (std::size_t i = 0; i < corners.size(); ++i) {
                 const Index at =
@@ -90,13 +78,14 @@ public:
         if (shading_ == Shading::smooth || corners.size() > kMostCreased) return;
 
         units_.clear();
+        bool is_smooth = true;
         for (Index f : faces) {
             units_.push_back(unit(areas_[f]));
             // Twice half the angle is the whole: then every pair is within it.
             const float half = std::sqrt(std::max(0.0f, 0.5f + 0.5f * least_cosine_));
-            is_smooth_ = is_smooth_ && (units_.back().isZero() || units_.back().dot(smooth) >= half);
+            is_smooth = is_smooth && (units_.back().isZero() || units_.back().dot(smooth) >= half);
         }
-        if (is_smooth_) return;
+        if (is_smooth) return;
         for (std::size_t i = 0; i < corners.size(); ++i) {
             sum = Vec3f::Zero();
             for (std::size_t j = 0; j < corners.size(); ++j)
@@ -105,45 +94,24 @@ public:
         }
     }
 
-    /// Of the corners that `at` was asked about last: appends the faces that corner i's normal was made of.
-    void add_faces_of(std::size_t i, std::span<const Index> faces, std::vector<Index>& to) const {
-        if (areas_.empty()) return;
-        if (shading_ == Shading::flat) {
-            to.push_back(faces[i]);
-            return;
-        }
-        for (std::size_t j = 0; j < faces.size(); ++j)
-            if (is_smooth_ || units_[i].isZero() || are_smooth(i, j)) to.push_back(faces[j]);
-    }
-
 private:
     bool are_smooth(std::size_t i, std::size_t j) const { return i == j || units_[i].dot(units_[j]) >= least_cosine_; }
 
-    bool is_smooth_ = true;
     const Mesh& mesh_;
     Shading shading_;
     float least_cosine_;
     std::vector<Vec3f> areas_, units_;
 };
 
-std::vector<Index> faces_of_corners(const Mesh& mesh) {
-    std::vector<Index> face_of_corner(mesh.corner_count());
-    for (Index f = 0; f < mesh.face_count(); ++f)
-        std::fill(face_of_corner.begin() + mesh.face_offsets[f], face_of_corner.begin() + mesh.face_offsets[f + 1], f);
-    return face_of_corner;
-}
-
 /// The vertices that are drawn: the corners at one place fall together where vertex, normal and UV agree.
 class DrawVertices {
 public:
-    DrawVertices(const Mesh& mesh, NormalFaces normal_faces, DrawArrays& arrays)
-        : of_corner(mesh.corner_count()), mesh_(mesh), normal_faces_(normal_faces), arrays_(arrays) {}
+    DrawVertices(const Mesh& mesh, DrawArrays& arrays) : of_corner(mesh.corner_count()), mesh_(mesh), arrays_(arrays) {}
 
     std::vector<Index> of_corner; ///< which of them a corner has
 
-    /// For the corners at one place, with the face and the normal of each.
-    void add(std::span<const Index> corners, std::span<const Index> faces, std::span<const Vec3f> normals,
-             const CornerNormals& made_by) {
+    /// For the corners at one place, with the normal of each.
+    void add(std::span<const Index> corners, std::span<const Vec3f> normals) {
         const std::size_t first = arrays_.vertex.size();
         for (std::size_t i = 0; i < corners.size(); ++i) {
             const Index vertex = mesh_.corners[corners[i]];
@@ -156,18 +124,10 @@ public:
             if (d < arrays_.vertex.size()) continue;
             arrays_.vertex.push_back(vertex);
             arrays_.normals.push_back(normals[i]);
-            if (normal_faces_ == NormalFaces::keep) {
-                arrays_.normal_offsets.push_back(static_cast<Index>(arrays_.normal_faces.size()));
-                made_by.add_faces_of(i, faces, arrays_.normal_faces);
-            }
             if (mesh_.uvs.empty()) continue;
             uv_of_draw_.push_back(uv);
             arrays_.uvs.push_back(uv == kNoIndex ? Vec2f(Vec2f::Zero()) : mesh_.uvs.values[uv]);
         }
-    }
-    void finish() {
-        if (normal_faces_ == NormalFaces::keep)
-            arrays_.normal_offsets.push_back(static_cast<Index>(arrays_.normal_faces.size()));
     }
 
 private:
@@ -176,7 +136,6 @@ private:
     }
 
     const Mesh& mesh_;
-    NormalFaces normal_faces_;
     DrawArrays& arrays_;
     std::vector<Index> uv_of_draw_;
 };
@@ -252,13 +211,14 @@ void add_triangles(const Mesh& mesh, const Triangulation& cut, const SurfaceOpti
 } // namespace
 
 Result<DrawArrays> make_draw_arrays(const Mesh& mesh, std::span<const Vec3f> positions, const SurfaceOptions& options,
-                                    const RunContext& context, NormalFaces normal_faces) {
+                                    const RunContext& context) {
     DrawArrays arrays;
-    const std::vector<Index> place = weld_map(positions), face_of_corner = faces_of_corners(mesh);
-    const CornersAt at = corners_at_places(mesh, place);
+    const std::vector<Index> place = weld_map(positions);
+    const PolygonCorners polygons(mesh.face_offsets);
+    const IndexLists at = corners_at_places(mesh, place);
     if (context.is_cancelled()) return cancelled_error();
     CornerNormals corner_normals(mesh, positions, options, context);
-    DrawVertices vertices(mesh, normal_faces, arrays);
+    DrawVertices vertices(mesh, arrays);
     std::vector<Vec3f> normals;
     std::vector<Index> faces;
     for (std::size_t p = 0; p < place.size(); ++p) {
@@ -266,31 +226,17 @@ Result<DrawArrays> make_draw_arrays(const Mesh& mesh, std::span<const Vec3f> pos
             if (context.is_cancelled()) return cancelled_error();
             context.report("preparing to draw", double(p) / double(place.size()));
         }
-        const std::span corners(at.corners.data() + at.offsets[p], at.offsets[p + 1] - at.offsets[p]);
+        const std::span corners = at[p];
         if (corners.empty()) continue;
         faces.clear();
-        for (Index c : corners) faces.push_back(face_of_corner[c]);
+        for (Index c : corners) faces.push_back(polygons.face(c));
         corner_normals.at(corners, faces, normals);
-        vertices.add(corners, faces, normals, corner_normals);
+        vertices.add(corners, normals);
     }
-    vertices.finish();
     const Result<Triangulation> cut = triangulate(mesh, context);
     if (!cut) return cut.error();
     add_triangles(mesh, *cut, options, vertices.of_corner, arrays);
     return arrays;
-}
-
-void normals_of_moved(const Mesh& mesh, std::span<const Vec3f> positions, const DrawArrays& arrays,
-                      std::span<Vec3f> normals, const RunContext& context) {
-    const std::vector<Vec3f> areas = face_areas(mesh, positions, context);
-    parallel_for(context, normals.size(), 4096, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t d = begin; d < end; ++d) {
-            Vec3f sum = Vec3f::Zero();
-            for (Index i = arrays.normal_offsets[d]; i < arrays.normal_offsets[d + 1]; ++i)
-                sum += areas[arrays.normal_faces[i]];
-            normals[d] = unit(sum);
-        }
-    });
 }
 
 } // namespace filigree

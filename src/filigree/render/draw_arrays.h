@@ -1,7 +1,7 @@
 // A mesh in the shape a GPU draws: triangles over vertices that each have one normal and one UV.
 #pragma once
 
-#include "filigree/render/drawable.h"
+#include "filigree/render.h"
 
 namespace filigree {
 
@@ -17,23 +17,12 @@ struct DrawArrays {
         Index first = 0, count = 0;
     };
     std::vector<Part> parts; ///< runs of triangles of one material
-
-    /// Only when asked for, and only of normals that come from the faces: the faces whose areas, added up, point along
-    /// draw vertex d's normal are normal_faces[normal_offsets[d]] .. [normal_offsets[d + 1] - 1].
-    std::vector<Index> normal_offsets, normal_faces;
 };
-
-enum class NormalFaces { forget, keep };
 
 /// Vertices are shared wherever normal and UV agree. Vertices at the same place count as one for smoothing, so that a
 /// triangle soup is smooth too. `positions` stand in for the mesh's own. Cost O(corners), and O(n^2) at a vertex of n
 /// faces up to n = 256; beyond that its normals are smooth.
 Result<DrawArrays> make_draw_arrays(const Mesh& mesh, std::span<const Vec3f> positions, const SurfaceOptions& options,
-                                    const RunContext& context, NormalFaces normal_faces = NormalFaces::forget);
-
-/// The normals of the same arrays after the vertices have moved, by the faces they were made of: creases stay where
-/// they are. Arrays with normal_faces only. `normals`: one a draw vertex.
-void normals_of_moved(const Mesh& mesh, std::span<const Vec3f> positions, const DrawArrays& arrays,
-                      std::span<Vec3f> normals, const RunContext& context);
+                                    const RunContext& context);
 
 } // namespace filigree

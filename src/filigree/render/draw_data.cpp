@@ -1,6 +1,5 @@
 // The processor's half of drawables: nothing here calls OpenGL.
 #include "filigree/core/parallel_for.h"
-#include "filigree/mesh/normals.h"
 #include "filigree/mesh/vertex_cache.h"
 #include "filigree/render/drawable_content.h"
 #include "filigree/render/octahedron.h"
@@ -108,28 +107,11 @@ void fill(DrawData::Content& content, const Mesh& mesh, const SurfaceOptions& op
     }
 }
 
-Result<DrawArrays> arrays_of(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context,
-                             NormalFaces normal_faces) {
+Result<DrawArrays> arrays_of(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context) {
     if (mesh.face_count() == 0) return nothing_to_draw();
-    Result<DrawArrays> draw = make_draw_arrays(mesh, mesh.positions, options, context, normal_faces);
+    Result<DrawArrays> draw = make_draw_arrays(mesh, mesh.positions, options, context);
     if (draw && draw->triangles.empty()) return nothing_to_draw();
     return draw;
-}
-
-Status move_reference(ModelMotion& motion, const Pose& pose, const RunContext& context) {
-    Result<std::vector<Vec3f>> at = motion.restorer->positions(pose, context);
-    if (!at) return at.error();
-    const DrawArrays& arrays = motion.arrays;
-    for (std::size_t d = 0; d < motion.positions.size(); ++d) motion.positions[d] = (*at)[arrays.vertex[d]];
-    if (!arrays.normal_faces.empty()) {
-        normals_of_moved(*motion.rest, *at, arrays, motion.normals, context);
-        return Success{};
-    }
-    // The mesh came with normals of its own: where there was one, the moved faces give another.
-    const std::vector<Vec3f> normals = vertex_normals(*motion.rest, *at, context);
-    for (std::size_t d = 0; d < motion.normals.size(); ++d)
-        motion.normals[d] = arrays.normals[d].isZero() ? Vec3f(Vec3f::Zero()) : normals[arrays.vertex[d]];
-    return Success{};
 }
 
 } // namespace
@@ -150,7 +132,6 @@ Status move_vertices(ModelMotion& motion, const Pose& pose, std::size_t count, c
     if (context.is_cancelled()) return cancelled_error();
     motion.positions.resize(count);
     motion.normals.resize(count);
-    if (!motion.on_cpu) return move_reference(motion, pose, context);
     const Result<std::vector<Mat3f>> gradients = motion.restorer->gradients(pose, context);
     if (!gradients) return gradients.error();
     motion.on_cpu->restore(pose.positions, *gradients, motion.positions, motion.normals, false, context);
@@ -181,7 +162,7 @@ DrawData::~DrawData() = default;
 
 Result<DrawData> DrawData::surface(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context) {
     if (std::optional<Error> error = mesh_error(mesh)) return *error;
-    Result<DrawArrays> draw = arrays_of(mesh, options, context, NormalFaces::forget);
+    Result<DrawArrays> draw = arrays_of(mesh, options, context);
     if (!draw) return draw.error();
     auto content = std::make_unique<Content>();
     fill(*content, mesh, options, *draw, {}, context);
@@ -192,25 +173,16 @@ Result<DrawData> DrawData::model(const Model& model, const RestoreOptions& resto
                                  RestoreOn where, const RunContext& context) {
     const Result<unsigned> level = restored_level(model, restore);
     if (!level) return level.error();
-    const bool is_reference = model.code() == DetailCode::reference;
-    Mesh rest = level_mesh(model, *level);
-    Result<DrawArrays> draw = arrays_of(rest, options, context, is_reference ? NormalFaces::keep : NormalFaces::forget);
+    const Mesh rest = level_mesh(model, *level);
+    Result<DrawArrays> draw = arrays_of(rest, options, context);
     if (!draw) return draw.error();
 
     auto content = std::make_unique<Content>();
     ModelMotion& motion = content->motion;
     motion.model = &model;
-    RestoreOptions restored = restore;
-    if (!is_reference) restored.level = 0;
-    Result<Restorer> restorer = Restorer::create(model, restored, context);
+    Result<Restorer> restorer = Restorer::create(model, {.level = 0}, context);
     if (!restorer) return restorer.error();
     motion.restorer = std::move(restorer).value();
-    if (is_reference) {
-        fill(*content, rest, options, *draw, {}, context);
-        motion.rest = std::move(rest);
-        motion.arrays = std::move(draw).value();
-        return DrawData(std::move(content));
-    }
 
     std::vector<Index> vertices(draw->vertex); // of the finest mesh
     if (*level < model.finest_level())
@@ -225,8 +197,8 @@ Result<DrawData> DrawData::model(const Model& model, const RestoreOptions& resto
     } else {
         std::vector<BlendRestorer::Item> items(vertices.size());
         for (Index i = 0; i < items.size(); ++i) items[i] = {vertices[i], i};
-        motion.on_cpu.emplace(std::get<BlendDetail>(model.detail), model.mesh.positions, model.driver().vertices, items,
-                              draw->normals, context);
+        motion.on_cpu.emplace(model.detail, model.mesh.positions, model.driver().vertices, items, draw->normals,
+                              context);
         drawn_at.resize(items.size());
         for (Index r = 0; r < items.size(); ++r) drawn_at[motion.on_cpu->slots()[r]] = r;
     }

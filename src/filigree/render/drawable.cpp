@@ -1,7 +1,6 @@
-#include "filigree/render/drawable.h"
+#include "filigree/render.h"
 
 #include "filigree/core/parallel_for.h"
-#include "filigree/render/color_map.h"
 #include "filigree/render/drawable_content.h"
 
 #include <algorithm>

@@ -18,19 +18,15 @@ using ColorBytes = std::array<std::uint8_t, 4>;
 /// What moves a model's vertices, from pose to pose.
 struct ModelMotion {
     const Model* model = nullptr;
-    std::optional<Restorer> restorer; ///< reference models: the level; blend models: the driver, for its gradients
+    std::optional<Restorer> restorer; ///< of the driver, for its gradients
 
     // Restored by the vertex shader.
     std::optional<GpuRestorer> on_gpu;
     std::optional<PoseBox> pose_box;
 
-    // Blend models restored by the processor, in the order of drawing.
+    // Restored by the processor, in the order of drawing.
     std::optional<BlendRestorer> on_cpu;
     std::vector<Vec3f> positions, normals; ///< kept from pose to pose, as making arrays takes time
-
-    // Reference models: the level, and how its normals come from it.
-    std::optional<Mesh> rest;
-    DrawArrays arrays; ///< without triangles, UVs and parts
 };
 
 /// Scalars of the mesh's vertices as draw vertices have them: the place in their range, and far below for none.

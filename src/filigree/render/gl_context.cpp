@@ -1,4 +1,4 @@
-#include "filigree/render/gl_context.h"
+#include "filigree/render.h"
 
 #include <dlfcn.h>
 #include <epoxy/egl.h>

@@ -138,10 +138,6 @@ Status GpuRestorer::upload() { return content_->upload(); }
 Result<GpuRestorer> GpuRestorer::prepare(const Model& model, std::span<const Index> vertices,
                                          std::span<const Vec3f> normals, const RestoreOptions& options,
                                          const RunContext& context) {
-    if (model.code() != DetailCode::blend)
-        return Error{ErrorCode::unsuitable,
-                     "A model of the reference code cannot be restored on the GPU: restore it on "
-                     "the CPU, or strip the mesh with the blend code."};
     if (const Result<unsigned> level = restored_level(model, options); !level) return level.error();
     const std::size_t vertex_count = model.mesh.vertex_count();
     for (Index vertex : vertices)
@@ -153,13 +149,12 @@ Result<GpuRestorer> GpuRestorer::prepare(const Model& model, std::span<const Ind
                                               std::to_string(vertices.size()) + " vertices: give one each, or none."};
     if (context.is_cancelled()) return cancelled_error();
 
-    const BlendDetail& detail = std::get<BlendDetail>(model.detail);
+    const BlendDetail& detail = model.detail;
     auto content = std::make_unique<Content>();
     content->model = &model;
     content->precision = detail.precision;
     content->has_normals = !normals.empty();
-    Result<Restorer> driver =
-        Restorer::create(model, {.law = options.law, .thin_shell = options.thin_shell, .level = 0}, context);
+    Result<Restorer> driver = Restorer::create(model, {.level = 0}, context);
     if (!driver) return driver.error();
     content->driver.emplace(std::move(*driver));
 

@@ -16,8 +16,8 @@ public:
     /// zero normal stays zero). Several items may share a vertex (with different normals). The model must outlive the
     /// restorer. Starts at rest. Of the options a level is only checked: the items say what is restored.
     /// Records are float or int16 as the model's are: 24 or 12 bytes an item, and 4 for its normal.
-    /// Errors: usage (no such level), mismatch (no such vertex, or another number of normals), unsuitable (a reference
-    /// model: restore it on the CPU), unsupported (no storage buffers in vertex shaders), out_of_memory, cancelled.
+    /// Errors: usage (no such level), mismatch (no such vertex, or another number of normals), unsupported (no storage
+    /// buffers in vertex shaders), out_of_memory, cancelled.
     static Result<GpuRestorer> create(const Model& model, std::span<const Index> vertices,
                                       std::span<const Vec3f> normals, const RestoreOptions& options,
                                       const RunContext& context);

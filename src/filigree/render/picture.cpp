@@ -1,5 +1,5 @@
-#include "filigree/render/picture.h"
 #include "filigree/io/file.h"
+#include "filigree/render.h"
 
 #include <cmath>
 #include <cstring>

@@ -3,7 +3,7 @@
 namespace filigree {
 
 PoseBox::PoseBox(const Model& model, std::span<const Index> vertices) {
-    const BlendDetail& detail = std::get<BlendDetail>(model.detail);
+    const BlendDetail& detail = model.detail;
     for (Index v : model.driver().vertices) rest_.push_back(model.mesh.positions[v].cast<double>());
     std::vector<char> is_wanted(model.mesh.vertex_count(), 0);
     for (Index v : vertices) is_wanted[v] = 1;

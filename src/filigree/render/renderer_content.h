@@ -2,10 +2,10 @@
 // renderer_objects.cpp draws what is in the scene. Only for this layer's own sources.
 #pragma once
 
+#include "filigree/render.h"
 #include "filigree/render/drawable_content.h"
 #include "filigree/render/lights.h"
 #include "filigree/render/render_targets.h"
-#include "filigree/render/renderer.h"
 
 #include <compare>
 #include <map>

@@ -1,5 +1,5 @@
 // Surfaces, points and the ground, each by a program made for what it needs.
-#include "filigree/render/color_map.h"
+#include "filigree/render.h"
 #include "filigree/render/renderer_content.h"
 #include "filigree/render/shaders.h"
 

@@ -1,7 +1,7 @@
 // A mesh's colours and textures from the libraries it names, ready to be drawn.
 #pragma once
 
-#include "filigree/render/drawable.h"
+#include "filigree/render.h"
 
 #include <filesystem>
 #include <memory>

@@ -1,8 +1,8 @@
 #include "filigree/sample/closure.h"
 
 #include "filigree/core/disjoint_sets.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/mesh/surface.h"
-#include "filigree/sample/edge_balance.h"
 #include "filigree/sample/nesting.h"
 
 namespace filigree {
@@ -21,16 +21,17 @@ struct Survey {
 Survey survey(std::span<const Triangle> triangles, std::span<const Vec3f> positions) {
     Survey found{.parts = triangles.size(), .joined = DisjointSets(triangles.size())};
     Closure& closure = found.closure;
-    for_each_edge(positions.size(), triangles, [&](const EdgeBalance& edge) {
-        closure.unbalanced += edge.net != 0;
-        closure.turned += edge.triangles == 2 && edge.net != 0;
-        found.is_crowded |= edge.triangles > 2;
-        for (const TriangleSide& side : edge.sides.subspan(1))
-            found.parts -= found.joined.join(edge.sides[0].triangle(), side.triangle());
-        if (edge.triangles % 2 == 0) return;
-        found.border_sum += positions[edge.low].cast<double>() + positions[edge.high].cast<double>();
-        if (closure.open_edges++ == 0) closure.first_open = {positions[edge.low], positions[edge.high]};
-    });
+    for (const std::span<const Index> edge : edges_of(triangles, positions.size())) {
+        const bool is_balanced = edge_balance(triangles, edge) == 0;
+        closure.unbalanced += !is_balanced;
+        closure.turned += edge.size() == 2 && !is_balanced;
+        found.is_crowded |= edge.size() > 2;
+        for (const Index h : edge.subspan(1)) found.parts -= found.joined.join(edge[0] / 3, h / 3);
+        if (edge.size() % 2 == 0) continue;
+        const auto [low, high] = edge_ends(triangles, edge);
+        found.border_sum += positions[low].cast<double>() + positions[high].cast<double>();
+        if (closure.open_edges++ == 0) closure.first_open = {positions[low], positions[high]};
+    }
     return found;
 }
 

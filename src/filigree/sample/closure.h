@@ -10,16 +10,6 @@
 
 namespace filigree {
 
-/// How a mesh closes, with vertices at one place made one.
-struct Closure {
-    std::size_t open_edges = 0; ///< edges with an odd number of triangles
-    std::size_t unbalanced = 0; ///< edges whose triangles do not run along them as often one way as the other
-    std::size_t turned = 0;     ///< of these the edges of two triangles, which run the same way
-    std::array<Vec3f, 2> first_open = {Vec3f::Zero(), Vec3f::Zero()}; ///< ends of the first open edge
-    bool is_closed() const { return open_edges == 0; }
-    bool is_oriented() const { return unbalanced == 0; }
-};
-
 /// Triangles of a mesh over welded vertices, those that repeat a vertex left out, and turned so that they look away
 /// from the inside (outward.h). What is left unbalanced is open, crosses itself at an edge of more than two faces, or
 /// has only one side.
@@ -35,13 +25,5 @@ Result<WeldedTriangles> weld_triangles(const Mesh& mesh, const RunContext& conte
 /// What weld_triangles does to the triangles of a surface: empty where all of them stay as they are. closure: before.
 std::vector<FaceTurn> turns_of(const Surface& surface, std::span<const Vec3f> positions, OutwardReport& report,
                                Closure* closure = nullptr);
-
-/// How much is inside of a mesh that is closed once it is welded and turned, model units cubed; overlaps count twice.
-struct InsideVolume {
-    std::optional<double> volume; ///< none: the mesh is open, or has only one side
-    OutwardReport outward;
-};
-/// Cost and errors: as weld_triangles.
-Result<InsideVolume> inside_volume(const Mesh& mesh, const RunContext& context);
 
 } // namespace filigree

@@ -1,18 +1,14 @@
 // On which side of a line or a plane a point lies, exactly.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/sample.h"
 
 #include <array>
 #include <cstdint>
 
 namespace filigree::exact {
 
-/// How often the plain double filter could not decide, for reports. Not shared between threads: add up.
-struct Tally {
-    std::uint64_t integers = 0;   ///< decided in 128-bit integers
-    std::uint64_t expansions = 0; ///< decided by floating-point expansions [Shewchuk 1997]
-};
+using Tally = ExactDecisions; ///< not shared between threads: add up
 
 /// Sign (-1, 0, 1) of (b - a) x (c - a): 1 when a, b, c turn counter-clockwise. Exact when all coordinates are zero or
 /// from 2^-300 to 2^300 in size, as all floats are; beyond, products may leave the range of doubles. Filter first, then

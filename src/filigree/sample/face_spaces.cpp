@@ -1,7 +1,7 @@
 #include "filigree/sample/face_spaces.h"
 
 #include "filigree/core/disjoint_sets.h"
-#include "filigree/mesh/half_edges.h"
+#include "filigree/mesh/edges.h"
 
 #include <algorithm>
 #include <cmath>
@@ -22,12 +22,6 @@ struct SuspectFace {
         return corners != other.corners ? corners < other.corners : first < other.first;
     }
 };
-
-/// An edge of two triangles that have the same three corners.
-bool is_one_face_twice(std::span<const Triangle> triangles, std::span<const Index> edge) {
-    const auto apex = [&](Index h) { return half_edge_start(triangles, previous_half_edge(h)); };
-    return edge.size() == 2 && apex(edge[0]) == apex(edge[1]);
-}
 
 /// Faces with a suspect triangle, those of the same corners side by side, in the order of faces.
 std::vector<SuspectFace> suspect_faces(std::span<const Triangle> triangles, std::span<const Index> faces,
@@ -71,18 +65,18 @@ public:
             known_[p] = !patches.part_is_open[p] && !patches.part_is_simple[p];
     }
 
-    void join_around(std::span<const Index> sorted) {
+    void join_around(const IndexLists& edges) {
         std::vector<FaceAtEdge> faces;
-        for_each_edge(triangles_, sorted, [&](std::span<const Index> edge) {
+        for (const std::span<const Index> edge : edges) {
             const Index part = part_of(edge[0] / 3);
-            if (!known_[part] || edge.size() < 2) return;
-            if (edge.size() == 2 && patches_.of[edge[0] / 3] == patches_.of[edge[1] / 3]) return;
+            if (!known_[part] || edge.size() < 2) continue;
+            if (edge.size() == 2 && patches_.of[edge[0] / 3] == patches_.of[edge[1] / 3]) continue;
             look_along(edge, faces);
             for (std::size_t i = 0; i < faces.size(); ++i) {
                 const FaceAtEdge& next = faces[(i + 1) % faces.size()];
                 nodes_.join(faces[i].after, next.before);
             }
-        });
+        }
     }
 
     PatchSides sides() {
@@ -271,22 +265,22 @@ private:
 } // namespace
 
 RepeatedFaces repeated_faces(std::span<const Triangle> triangles, std::span<const Index> faces,
-                             std::span<const Index> sorted) {
+                             const IndexLists& edges) {
     RepeatedFaces found;
     found.left_out.assign(triangles.size(), 0);
     found.all_of_part.assign(triangles.size(), 0);
     std::vector<std::uint8_t> is_odd(triangles.size(), 0), is_suspect(triangles.size(), 0);
     DisjointSets parts(triangles.size());
-    for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
+    for (const std::span<const Index> edge : edges) {
         for (const Index h : edge) parts.join(edge[0] / 3, h / 3);
         if (edge.size() > 2 || is_one_face_twice(triangles, edge))
             for (const Index h : edge) is_suspect[h / 3] = 1;
-    });
+    }
     std::vector<SuspectFace> suspects = suspect_faces(triangles, faces, is_suspect);
     if (suspects.empty()) return found;
-    for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
+    for (const std::span<const Index> edge : edges) {
         if (edge.size() % 2 == 1) is_odd[parts.root(edge[0] / 3)] = 1;
-    });
+    }
     std::vector<std::size_t> in_groups(triangles.size(), 0), common(triangles.size(), 0), of_part(triangles.size(), 0);
     const auto for_each_group = [&](const auto& visit) {
         for (std::size_t begin = 0; begin < suspects.size();) {
@@ -316,23 +310,18 @@ RepeatedFaces repeated_faces(std::span<const Triangle> triangles, std::span<cons
 }
 
 std::vector<std::int8_t> winding_signs(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                                       std::span<const Index> sorted) {
-    std::vector<Index> neighbour(3 * triangles.size(), kNoIndex);
+                                       const IndexLists& edges) {
     DisjointSets joined(triangles.size());
     std::vector<std::uint8_t> is_unfit(triangles.size(), 0), is_crowded(triangles.size(), 0); // of parts
-    for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
+    for (const std::span<const Index> edge : edges) {
         for (const Index h : edge) joined.join(edge[0] / 3, h / 3);
-    });
-    for_each_edge(triangles, sorted, [&](std::span<const Index> edge) {
-        int net = 0;
-        for (const Index h : edge) net += half_edge_start(triangles, h) < half_edge_end(triangles, h) ? 1 : -1;
+    }
+    for (const std::span<const Index> edge : edges) {
         const Index part = joined.root(edge[0] / 3);
-        if (net != 0) is_unfit[part] = 1;
+        if (edge_balance(triangles, edge) != 0) is_unfit[part] = 1;
         if (edge.size() > 2) is_crowded[part] = 1;
-        if (edge.size() != 2 || is_one_face_twice(triangles, edge)) return;
-        neighbour[edge[0]] = edge[1];
-        neighbour[edge[1]] = edge[0];
-    });
+    }
+    const std::vector<Index> neighbour = neighbour_half_edges(triangles, edges);
     Patches patches;
     Labels labels = components(neighbour);
     patches.of = std::move(labels.of);
@@ -350,7 +339,7 @@ std::vector<std::int8_t> winding_signs(std::span<const Vec3f> positions, std::sp
         patches.part[patches.of[t]] = number[root];
     }
     Spaces spaces(positions, triangles, patches);
-    spaces.join_around(sorted);
+    spaces.join_around(edges);
     const std::vector<std::int8_t> of_part = spaces.winding_signs();
     std::vector<std::int8_t> signs(triangles.size());
     for (Index t = 0; t < triangles.size(); ++t) signs[t] = of_part[patches.part[patches.of[t]]];
@@ -358,9 +347,9 @@ std::vector<std::int8_t> winding_signs(std::span<const Vec3f> positions, std::sp
 }
 
 PatchSides sides_of_patches(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                            std::span<const Index> sorted, const Patches& patches) {
+                            const IndexLists& edges, const Patches& patches) {
     Spaces spaces(positions, triangles, patches);
-    spaces.join_around(sorted);
+    spaces.join_around(edges);
     return spaces.sides();
 }
 

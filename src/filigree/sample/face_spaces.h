@@ -1,7 +1,7 @@
 // Surfaces with edges of three triangles and more: faces that are there twice, and the spaces that faces divide.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh/edges.h"
 
 #include <cstdint>
 
@@ -13,16 +13,16 @@ struct RepeatedFaces {
 };
 /// Triangles that do not count because their faces have the same vertices as others. Parts (faces that hang
 /// together over edges) with an even number of triangles at each edge keep one of an odd number; if all of a part is
-/// there equally often, and in the others, one of any number. faces: each triangle's, ascending. sorted:
-/// half_edges_by_edge. Cost O(F).
+/// there equally often, and in the others, one of any number. faces: each triangle's, ascending. edges:
+/// edges_of the triangles. Cost O(F).
 RepeatedFaces repeated_faces(std::span<const Triangle> triangles, std::span<const Index> faces,
-                             std::span<const Index> sorted);
+                             const IndexLists& edges);
 
 /// Of each triangle 1, or -1, where all spaces that its part divides have winding numbers of 0 and more, or of 0 and
 /// less, not all of them 0: the part is solids that touch or cross and look outwards, or inwards. 0: not so, or the
 /// part is not closed, or its triangles do not cancel at each edge. Cost as sides_of_patches.
 std::vector<std::int8_t> winding_signs(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                                       std::span<const Index> sorted);
+                                       const IndexLists& edges);
 
 /// Patches of faces: neighbours over edges of two triangles, which agree in direction.
 struct Patches {
@@ -42,6 +42,6 @@ struct PatchSides {
 
 /// triangles: those of a patch run the same way round. Cost O(F) and, at an edge of d triangles, O(d log d).
 PatchSides sides_of_patches(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                            std::span<const Index> sorted, const Patches& patches);
+                            const IndexLists& edges, const Patches& patches);
 
 } // namespace filigree

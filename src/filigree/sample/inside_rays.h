@@ -26,11 +26,7 @@ public:
     RayParity& operator=(RayParity&&) noexcept;
     ~RayParity();
 
-    struct Count {
-        std::uint64_t crossings = 0, triangles_tested = 0;
-        std::int64_t net = 0; ///< crossings from the side that normals point to, less those from behind
-        exact::Tally tally;
-    };
+    using Count = RayReport;
     /// Points outside the mesh's box, and those that are no numbers, are outside without a count. Adds to `count`.
     bool contains(const Vec3d& point, Count* count = nullptr) const { return crossings(point, count).is_odd; }
 

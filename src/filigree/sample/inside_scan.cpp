@@ -3,6 +3,7 @@
 // plane (lower bound along x), where one bit is toggled. Then every row is prefix-XORed, 64 points at a time. Nothing
 // is sorted, and `at or beyond` everywhere is all there is of tie-breaking.
 #include "filigree/sample/inside_scan.h"
+#include "filigree/sample/lattice_memory.h"
 
 #include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"

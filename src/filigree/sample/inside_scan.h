@@ -7,19 +7,10 @@
 #pragma once
 
 #include "filigree/core/run_context.h"
+#include "filigree/sample.h"
 #include "filigree/sample/exact_sign.h"
-#include "filigree/sample/lattice.h"
 
 namespace filigree {
-
-/// Where closed parts overlap: parity makes the overlap outside, merged makes it inside (winding number 1 or more).
-enum class Overlap { parity, merged };
-
-struct ScanReport {
-    std::uint64_t crossings = 0; ///< of lattice rows with triangles
-    exact::Tally tally;          ///< decisions that the double filter left open
-    double seconds = 0;
-};
 
 /// Triangles as the scan takes them. Only coordinates count: vertices need not be shared, nor triangles turn the same
 /// way (but for `merged` and scan_winding).

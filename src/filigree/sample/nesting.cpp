@@ -2,6 +2,7 @@
 // buckets over y and z, and each triangle asks the buckets that it covers.
 #include "filigree/sample/nesting.h"
 
+#include "filigree/core/lists.h"
 #include "filigree/sample/exact_sign.h"
 
 #include <algorithm>
@@ -31,16 +32,10 @@ public:
     explicit PlaceGrid(std::vector<Place> places) : places_(std::move(places)) {
         for (const Place& place : places_) box_.extend(place.point);
         side_ = std::clamp<std::size_t>(std::size_t(std::sqrt(double(places_.size()))), 1, 1024);
-        std::vector<std::size_t> bucket(places_.size());
-        first_.assign(side_ * side_ + 1, 0);
-        for (std::size_t i = 0; i < places_.size(); ++i) {
-            bucket[i] = row(places_[i].point, 2) * side_ + row(places_[i].point, 1);
-            ++first_[bucket[i] + 1];
-        }
-        for (std::size_t b = 1; b < first_.size(); ++b) first_[b] += first_[b - 1];
-        std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
-        order_.resize(places_.size());
-        for (std::size_t i = 0; i < places_.size(); ++i) order_[next[bucket[i]]++] = Index(i);
+        buckets_ = make_lists<Index>(side_ * side_, [&](const auto& add) {
+            for (Index i = 0; i < places_.size(); ++i)
+                add(row(places_[i].point, 2) * side_ + row(places_[i].point, 1), i);
+        });
     }
 
     std::size_t size() const { return places_.size(); }
@@ -53,11 +48,11 @@ public:
             if (box.max[axis] < box_.min[axis] || (axis > 0 && box.min[axis] > box_.max[axis])) return;
         for (std::size_t z = row(box.min, 2); z <= row(box.max, 2); ++z)
             for (std::size_t b = z * side_ + row(box.min, 1); b <= z * side_ + row(box.max, 1); ++b)
-                for (std::size_t i = first_[b]; i < first_[b + 1]; ++i) {
-                    const Vec3d& p = places_[order_[i]].point;
+                for (const Index i : buckets_[b]) {
+                    const Vec3d& p = places_[i].point;
                     if (p[0] <= box.max[0] && p[1] >= box.min[1] && p[1] <= box.max[1] && p[2] >= box.min[2] &&
                         p[2] <= box.max[2])
-                        visit(order_[i]);
+                        visit(i);
                 }
     }
 
@@ -71,8 +66,7 @@ private:
     std::vector<Place> places_;
     Box box_;
     std::size_t side_ = 1;
-    std::vector<std::size_t> first_;
-    std::vector<Index> order_;
+    IndexLists buckets_;
 };
 
 std::array<Vec3d, 3> corners_of(const Triangle& t, std::span<const Vec3f> positions) {

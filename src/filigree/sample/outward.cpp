@@ -2,7 +2,7 @@
 
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/text.h"
-#include "filigree/mesh/half_edges.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/mesh/orientation.h"
 #include "filigree/sample/border_cones.h"
 #include "filigree/sample/face_spaces.h"
@@ -50,16 +50,15 @@ private:
     void turn_over(Triangle& t) const { std::swap(t[1], t[2]); }
 
     void leave_out_repeated() {
-        sorted_ = half_edges_by_edge(given_, positions_.size());
+        edges_ = edges_of(given_, positions_.size());
         bool is_crowded = false;
-        for_each_edge(given_, sorted_, [&](std::span<const Index> edge) {
-            is_crowded |= edge.size() > 2 || (edge.size() == 2 && apex(given_, edge[0]) == apex(given_, edge[1]));
-        });
+        for (const std::span<const Index> edge : edges_)
+            is_crowded |= edge.size() > 2 || is_one_face_twice(given_, edge);
         RepeatedFaces repeated;
         std::vector<std::int8_t> signs;
         if (is_crowded) {
-            repeated = repeated_faces(given_, faces_, sorted_);
-            signs = winding_signs(positions_, given_, sorted_);
+            repeated = repeated_faces(given_, faces_, edges_);
+            signs = winding_signs(positions_, given_, edges_);
         }
         for (Index t = 0; t < given_.size(); ++t) {
             const bool is_solid = is_crowded && signs[t] != 0 && !repeated.all_of_part[t];
@@ -71,11 +70,7 @@ private:
             source_.push_back(t);
             solid_sign_.push_back(is_solid ? signs[t] : std::int8_t{0});
         }
-        if (triangles_.size() < given_.size()) sorted_ = half_edges_by_edge(triangles_, positions_.size());
-    }
-
-    static Index apex(std::span<const Triangle> triangles, Index h) {
-        return half_edge_start(triangles, previous_half_edge(h));
+        if (triangles_.size() < given_.size()) edges_ = edges_of(triangles_, positions_.size());
     }
 
     /// Cones over the open edges of parts that are nearly closed: they are faces like others from here on.
@@ -83,12 +78,12 @@ private:
         DisjointSets parts(triangles_.size());
         std::vector<MissingSide> sides;
         std::vector<Index> beside; // the triangle at each side
-        for_each_edge(std::span<const Triangle>(triangles_), sorted_, [&](std::span<const Index> edge) {
+        for (const std::span<const Index> edge : edges_) {
             for (const Index h : edge) parts.join(edge[0] / 3, h / 3);
-            if (edge.size() != 1) return;
+            if (edge.size() != 1) continue;
             sides.push_back({half_edge_start(triangles_, edge[0]), half_edge_end(triangles_, edge[0]), 1});
             beside.push_back(edge[0] / 3);
-        });
+        }
         if (sides.empty()) return;
         const BorderCones cones = make_border_cones(positions_, sides);
         const auto area = [&](const Triangle& t, std::span<const Vec3f> positions) {
@@ -108,22 +103,18 @@ private:
         positions_ = closed_positions_;
         triangles_.insert(triangles_.end(), closing.begin(), closing.end());
         solid_sign_.resize(triangles_.size(), 0);
-        sorted_ = half_edges_by_edge(triangles_, positions_.size());
+        edges_ = edges_of(triangles_, positions_.size());
     }
 
     void find_patches() {
-        std::vector<Index> neighbour(3 * triangles_.size(), kNoIndex);
+        const std::vector<Index> neighbour = neighbour_half_edges(triangles_, edges_);
         DisjointSets parts(triangles_.size());
-        for_each_edge(std::span<const Triangle>(triangles_), sorted_, [&](std::span<const Index> edge) {
+        for (const std::span<const Index> edge : edges_)
             for (const Index h : edge) parts.join(edge[0] / 3, h / 3);
-            if (edge.size() != 2 || apex(triangles_, edge[0]) == apex(triangles_, edge[1])) return;
-            neighbour[edge[0]] = edge[1];
-            neighbour[edge[1]] = edge[0];
-        });
         turned_ = triangles_to_turn(triangles_, neighbour, positions_, OneSided::left);
         for (std::size_t t = 0; t < triangles_.size(); ++t)
             if (turned_[t]) turn_over(triangles_[t]);
-        if (std::ranges::find(turned_, 1) != turned_.end()) sorted_ = half_edges_by_edge(triangles_, positions_.size());
+        if (std::ranges::find(turned_, 1) != turned_.end()) edges_ = edges_of(triangles_, positions_.size());
         Labels patches = components(neighbour);
         patches_.of = std::move(patches.of);
         patches_.count = patches.count;
@@ -146,14 +137,14 @@ private:
         patches_.part_is_odd.assign(part_count_, 0);
         patches_.part_is_simple.assign(part_count_, 1);
         is_one_sided_.assign(part_count_, 0);
-        for_each_edge(std::span<const Triangle>(triangles_), sorted_, [&](std::span<const Index> edge) {
+        for (const std::span<const Index> edge : edges_) {
             const Index part = part_of(edge[0] / 3);
             if (edge.size() == 1) patches_.part_is_open[part] = 1;
             if (edge.size() % 2 == 1) patches_.part_is_odd[part] = 1;
             if (edge.size() > 2) patches_.part_is_simple[part] = 0;
             if (edge.size() == 2 && half_edge_start(triangles_, edge[0]) == half_edge_start(triangles_, edge[1]))
                 is_one_sided_[part] = 1;
-        });
+        }
     }
 
     /// Six times the volume of each part's cone from its first corner.
@@ -180,7 +171,7 @@ private:
         std::vector<std::uint8_t> turns(patches_.count, 0), walls(patches_.count, 0);
         PatchSides sides;
         const bool has_crowded = std::ranges::find(patches_.part_is_simple, 0) != patches_.part_is_simple.end();
-        if (has_crowded) sides = sides_of_patches(positions_, triangles_, sorted_, patches_);
+        if (has_crowded) sides = sides_of_patches(positions_, triangles_, edges_, patches_);
         for (Index p = 0; p < patches_.count; ++p) {
             const Index part = patches_.part[p];
             if (is_one_sided_[part] || patches_.part_is_open[part]) continue;
@@ -280,7 +271,7 @@ private:
     std::vector<std::int8_t> solid_sign_; ///< 1, -1: its part is solids that touch or cross (winding_signs)
     std::vector<std::uint8_t> turned_;    ///< beside what they were
     std::vector<std::uint8_t> is_wall_;   ///< with matter on both sides
-    std::vector<Index> sorted_;           ///< half-edges by edge
+    IndexLists edges_;                    ///< the half-edges of each
     std::vector<Vec3f> closed_positions_; ///< where there are cones
     Patches patches_;
     Index part_count_ = 0;

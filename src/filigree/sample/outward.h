@@ -1,27 +1,12 @@
 // Faces turned away from what is inside: the one answer to "inside" that all of Filigree takes.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/sample.h"
 
 #include <cstdint>
 #include <string>
 
 namespace filigree {
-
-/// What counts as other than it is in the file. Parts are faces that hang together over edges.
-struct OutwardReport {
-    std::size_t parts = 0;
-    std::size_t inward_parts = 0; ///< looked inwards, and count as turned outwards
-    std::size_t cavities = 0;     ///< lie in others and looked outwards: count as their hollows, turned
-    std::size_t turned_faces = 0; ///< triangles that ran against the rest of their part
-    std::size_t inner_faces = 0;  ///< triangles left out: walls between matter and matter, faces that are there twice
-    std::size_t one_sided_parts = 0; ///< as Moebius' band: left as they are, nothing tells their inside
-
-    bool is_as_it_was() const { return inward_parts + cavities + turned_faces + inner_faces + one_sided_parts == 0; }
-};
-
-/// The report as sentences; empty where nothing was changed.
-std::string outward_sentence(const OutwardReport& report);
 
 enum class FaceTurn : std::uint8_t { kept, turned, left_out };
 

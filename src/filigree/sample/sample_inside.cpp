@@ -1,4 +1,10 @@
-#include "filigree/sample/sample_inside.h"
+#include "filigree/sample.h"
+#include "filigree/sample/closure.h"
+#include "filigree/sample/inside_rays.h"
+#include "filigree/sample/inside_scan.h"
+#include "filigree/sample/lattice_memory.h"
+#include "filigree/sample/weld_for.h"
+#include "filigree/sample/winding_inside.h"
 
 #include "filigree/core/now_seconds.h"
 

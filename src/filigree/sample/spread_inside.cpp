@@ -1,8 +1,8 @@
-#include "filigree/sample/spread_inside.h"
+#include "filigree/sample.h"
 
+#include "filigree/core/hash.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/random.h"
-#include "filigree/sample/inside_test.h"
 
 #include <algorithm>
 #include <array>
@@ -108,10 +108,7 @@ private:
 
     Cell cell_of(const Vec3d& point) const { return ((point - corner_) / distance_).cast<std::int64_t>(); }
     std::size_t bucket(const Cell& cell) const {
-        std::uint64_t hash = std::uint64_t(cell[0] >> 2) * 0x9E3779B97F4A7C15u;
-        hash = (hash ^ (hash >> 29) ^ std::uint64_t(cell[1] >> 2)) * 0xBF58476D1CE4E5B9u;
-        hash = (hash ^ (hash >> 29) ^ std::uint64_t(cell[2] >> 2)) * 0x94D049BB133111EBu;
-        const std::uint64_t block = (hash ^ (hash >> 32)) & mask_;
+        const std::uint64_t block = hash_words(cell[0] >> 2, cell[1] >> 2, cell[2] >> 2) & mask_;
         return block * kBlockCells + std::size_t((cell[0] & 3) | (cell[1] & 3) << 2 | (cell[2] & 3) << 4);
     }
     /// Cells that share a bucket do not matter: what is too near is too near from any cell.

@@ -4,11 +4,13 @@
 // with a closed mesh are whole numbers, exactly. The winding numbers of the cones are then subtracted; only they need a
 // tree. They vary slowly away from the cones, so most blocks of points are decided at their centres.
 #include "filigree/sample/winding_inside.h"
+#include "filigree/sample/inside_scan.h"
+#include "filigree/sample/lattice_memory.h"
 
 #include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/sample/border_cones.h"
-#include "filigree/sample/edge_balance.h"
 
 #include <algorithm>
 #include <atomic>
@@ -21,10 +23,12 @@ namespace {
 /// Cones over the edges at which faces do not cancel.
 BorderCones cones_of(const ScanMesh& mesh) {
     std::vector<MissingSide> sides;
-    for_each_edge(mesh.positions.size(), mesh.triangles, [&](const EdgeBalance& e) {
-        if (e.net == 0) return;
-        sides.push_back(e.net > 0 ? MissingSide{e.low, e.high, e.net} : MissingSide{e.high, e.low, -e.net});
-    });
+    for (const std::span<const Index> edge : edges_of(mesh.triangles, mesh.positions.size())) {
+        const int net = edge_balance(mesh.triangles, edge);
+        if (net == 0) continue;
+        const auto [low, high] = edge_ends(mesh.triangles, edge);
+        sides.push_back(net > 0 ? MissingSide{low, high, net} : MissingSide{high, low, -net});
+    }
     return make_border_cones(mesh.positions, sides);
 }
 

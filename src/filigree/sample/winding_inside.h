@@ -9,13 +9,6 @@
 
 namespace filigree {
 
-/// How sure a classification by winding numbers is.
-struct WindingReport {
-    std::size_t open_edges = 0; ///< edges at which triangles do not cancel; cones close the mesh there
-    double near_half = 0;       ///< share of points with a winding number within 0.1 of 1/2 (or of another half)
-    double seconds = 0;
-};
-
 struct WindingOptions {
     double accuracy = 0.01;                     ///< as WindingTree
     std::size_t most_bytes = kMostLatticeBytes; ///< for all that is kept of a lattice

@@ -31,17 +31,15 @@ double default_max_edge(const Mesh& mesh, const Body& body) {
     return std::min(1.0, kLongestEdgeMade * body.spacing() / (body.scale * bounds(mesh).diagonal()));
 }
 
-/// For each of the driver's faces how many other vertices of the mesh hang on it. The blend code's cells are the faces;
-/// the reference code's quads all carry alike.
+/// For each of the driver's faces how many other vertices of the mesh hang on it: cells are the faces.
 std::vector<std::size_t> vertices_on_faces(const Model& model) {
     std::vector<std::size_t> carried(model.driver().face_count(), 1);
-    const auto* blend = std::get_if<BlendDetail>(&model.detail);
-    if (!blend) return carried;
+    const BlendDetail& detail = model.detail;
     std::vector<bool> is_driver(model.mesh.vertex_count());
     for (const Index v : model.driver().vertices) is_driver[v] = true;
     for (std::size_t f = 0; f < carried.size(); ++f)
-        carried[f] = std::size_t(std::count_if(blend->order.begin() + blend->cell_offsets[f],
-                                               blend->order.begin() + blend->cell_offsets[f + 1],
+        carried[f] = std::size_t(std::count_if(detail.order.begin() + detail.cell_offsets[f],
+                                               detail.order.begin() + detail.cell_offsets[f + 1],
                                                [&](Index v) { return !is_driver[v]; }));
     return carried;
 }

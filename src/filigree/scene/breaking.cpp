@@ -30,9 +30,10 @@ Result<Fracture> make_fracture(std::shared_ptr<const Body> body, const std::shar
                                double scale, const FractureMaterial& material, const RunContext& context,
                                BrokenBodyReport* report) {
     Partition partition{cells->pieces(), [cells, scale](const Vec3d& point) { return cells->piece_at(point / scale); }};
-    Result<BrokenBody> broken = break_body(std::move(body), std::move(partition), context, report);
+    Result<std::shared_ptr<const BrokenBody>> broken =
+        break_body(std::move(body), std::move(partition), context, report);
     if (!broken) return broken.error();
-    return Fracture{std::make_shared<const BrokenBody>(std::move(*broken)), material, {}};
+    return Fracture{std::move(*broken), material, {}};
 }
 
 double usual_fracture_energy(double strength, double young_modulus, double diagonal) {

@@ -1,8 +1,9 @@
 // A body and its model that break along the same cells.
 #pragma once
 
+#include "filigree/fracture.h"
 #include "filigree/fracture/broken_model.h"
-#include "filigree/physics/fracture.h"
+#include "filigree/physics/world.h"
 
 #include <memory>
 

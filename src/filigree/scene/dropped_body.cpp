@@ -1,7 +1,7 @@
 #include "filigree/scene/dropped_body.h"
 
 #include "filigree/mesh/shapes.h"
-#include "filigree/physics/own_weight.h"
+#include "filigree/physics/body/own_weight.h"
 #include "filigree/scene/particles_near.h"
 
 #include <algorithm>

@@ -207,8 +207,7 @@ Result<Surfels> MeltingSurface::surfels(const CompositeSurface& surface, const R
         std::vector<Vec3f> places(part.start.size(), Vec3f::Zero());
         for (std::size_t v = 0; v < places.size(); ++v)
             if (const Index at = now[first + v]; at != kNoIndex) places[v] = surface.mesh.positions[at];
-        Surfels own =
-            carried_surfels(part.surfels, places, vertex_gradients(std::get<BlendDetail>(model.detail), *driver));
+        Surfels own = carried_surfels(part.surfels, places, vertex_gradients(model.detail, *driver));
         append_if(own, [&](const Triangle& t) {
             return std::all_of(t.begin(), t.end(), [&](Index v) { return now[first + v] != kNoIndex; });
         });

@@ -4,7 +4,7 @@
 #include "filigree/io/file.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/material.h"
 #include "filigree/scene/scene_table.h"
 
 #include <algorithm>

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "filigree/core/view.h"
-#include "filigree/fracture/fracture_pattern.h"
+#include "filigree/fracture.h"
 #include "filigree/mesh/shapes.h"
 #include "filigree/physics/simulation.h"
 

@@ -1,5 +1,5 @@
 // The tables of docs/scenes.md, written from the rows of scene_keys.cpp.
-#include "filigree/physics/named_materials.h"
+#include "filigree/physics/material.h"
 #include "filigree/scene/scene_keys.h"
 
 #include <array>

@@ -1,13 +1,14 @@
 #include "filigree/scene/world_setup.h"
 
-#include "filigree/fracture/fracture.h"
+#include "filigree/fracture.h"
+#include "filigree/fracture/broken_model.h"
 #include "filigree/io/file.h"
 #include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/triangulate.h"
-#include "filigree/physics/grid_limits.h"
-#include "filigree/physics/own_weight.h"
+#include "filigree/physics/body/own_weight.h"
+#include "filigree/physics/grid/grid_limits.h"
 #include "filigree/scene/particles_near.h"
 
 #include <algorithm>

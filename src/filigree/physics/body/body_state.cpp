@@ -1,6 +1,7 @@
 #include "filigree/physics/body/body_state.h"
 
 #include "filigree/core/dense_solve.h"
+#include "filigree/physics/body/embedding.h"
 
 #include <Eigen/LU>
 #include <algorithm>

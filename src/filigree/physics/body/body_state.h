@@ -4,7 +4,7 @@
 #include "filigree/physics/body/body_hit.h"
 #include "filigree/physics/body/contact_corners.h"
 #include "filigree/physics/body/elasticity.h"
-#include "filigree/physics/broken_body.h"
+#include "filigree/physics/breaking/broken_body.h"
 
 #include <Eigen/Geometry>
 #include <optional>

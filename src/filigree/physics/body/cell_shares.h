@@ -1,7 +1,7 @@
 // Where the matter of cells that are not full counts.
 #pragma once
 
-#include "filigree/physics/cells.h"
+#include "filigree/physics/body.h"
 
 namespace filigree {
 

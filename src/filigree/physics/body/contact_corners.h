@@ -3,7 +3,7 @@
 #pragma once
 
 #include "filigree/core/run_context.h"
-#include "filigree/physics/embedding.h"
+#include "filigree/physics/body.h"
 
 namespace filigree {
 

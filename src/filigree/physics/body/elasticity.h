@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/core/run_context.h"
-#include "filigree/physics/vectors.h"
+#include "filigree/physics/body.h"
 
 #include <algorithm>
 #include <memory>

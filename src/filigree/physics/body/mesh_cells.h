@@ -1,7 +1,8 @@
 // Cells of a mesh, counted as a body counts its particles.
 #pragma once
 
-#include "filigree/physics/cells.h"
+#include "filigree/physics/body.h"
+#include "filigree/physics/body/make_cells.h"
 
 #include <functional>
 

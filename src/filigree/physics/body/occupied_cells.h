@@ -2,7 +2,7 @@
 // here is in model units.
 #pragma once
 
-#include "filigree/physics/cells.h"
+#include "filigree/physics/body.h"
 
 #include <optional>
 #include <string>

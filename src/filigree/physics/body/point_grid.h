@@ -1,7 +1,7 @@
 // Finding points near a place. Private to the layer.
 #pragma once
 
-#include "filigree/physics/vectors.h"
+#include "filigree/physics/body.h"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,7 @@
 #include "filigree/physics/body/surface_points.h"
 
+#include "filigree/core/hash.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -60,10 +62,7 @@ struct Cube {
 };
 
 struct KeyHash {
-    std::size_t operator()(const std::array<int, 3>& key) const {
-        return std::size_t(key[0]) * 0x9E3779B97F4A7C15u ^ std::size_t(key[1]) * 0xC2B2AE3D27D4EB4Fu ^
-               std::size_t(key[2]) * 0x165667B19E3779F9u;
-    }
+    std::size_t operator()(const std::array<int, 3>& key) const { return hash_words(key[0], key[1], key[2]); }
 };
 
 } // namespace

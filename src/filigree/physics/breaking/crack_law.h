@@ -4,7 +4,7 @@
 
 #include "filigree/core/random.h"
 #include "filigree/core/types.h"
-#include "filigree/physics/fracture.h"
+#include "filigree/physics/breaking/broken_body.h"
 
 #include <algorithm>
 #include <cmath>

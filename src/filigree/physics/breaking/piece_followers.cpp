@@ -1,5 +1,7 @@
 #include "filigree/physics/breaking/piece_followers.h"
 
+#include "filigree/physics/body/embedding.h"
+#include "filigree/physics/body/make_cells.h"
 #include <algorithm>
 #include <unordered_map>
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/physics/body.h"
-#include "filigree/physics/broken_body.h"
+#include "filigree/physics/world.h"
 
 namespace filigree {
 

@@ -1,7 +1,7 @@
 // How cells turn areas, many cells at a time. Private to the layer.
 #pragma once
 
-#include "filigree/physics/cells.h"
+#include "filigree/physics/body.h"
 
 #include <span>
 

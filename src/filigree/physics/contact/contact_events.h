@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/physics/contact/contact_pair.h"
-#include "filigree/physics/contact_event.h"
+#include "filigree/physics/simulation.h"
 
 #include <span>
 

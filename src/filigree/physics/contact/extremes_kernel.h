@@ -1,7 +1,7 @@
 // The least and the most of what particles have, many at a time. Private to the layer.
 #pragma once
 
-#include "filigree/physics/vectors.h"
+#include "filigree/physics/body.h"
 
 #include <span>
 

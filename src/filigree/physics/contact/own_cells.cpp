@@ -2,6 +2,7 @@
 
 #include "filigree/core/bits.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/body/embedding.h"
 #include "filigree/physics/contact/box_sweep.h"
 
 #include <algorithm>

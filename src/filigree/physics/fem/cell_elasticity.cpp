@@ -1,6 +1,7 @@
 // The fem material: what cell_kernel computes, behind the interface of all materials; the energy in double.
 #include "filigree/core/parallel_sum.h"
 #include "filigree/physics/body.h"
+#include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/fem/cell_kernel.h"
 
 #include <cmath>

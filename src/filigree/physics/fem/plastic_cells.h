@@ -1,7 +1,7 @@
 // What cells of a plastic fem body remember, and how they yield. Private to the layer.
 #pragma once
 
-#include "filigree/physics/cells.h"
+#include "filigree/physics/body.h"
 #include "filigree/physics/fem/plasticity.h"
 
 #include <array>

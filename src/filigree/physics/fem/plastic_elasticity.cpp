@@ -6,6 +6,7 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/parallel_sum.h"
 #include "filigree/physics/body.h"
+#include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/fem/cell_kernel.h"
 #include "filigree/physics/fem/plastic_cells.h"
 #include "filigree/physics/step/byte_stream.h"

@@ -10,7 +10,6 @@
 #include "filigree/physics/grid/mpm_barriers.h"
 #include "filigree/physics/grid/mpm_grid.h"
 #include "filigree/physics/grid/mpm_kernel.h"
-#include "filigree/physics/matter_particles.h"
 #include "filigree/physics/simulation.h"
 
 #include <string>

@@ -16,6 +16,7 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/parallel_sum.h"
 #include "filigree/physics/body/elasticity.h"
+#include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/springs/spring_kernel.h"
 
 #include <algorithm>

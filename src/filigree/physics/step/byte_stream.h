@@ -1,7 +1,7 @@
 // Saved states: plain values and arrays as bytes, end to end, and back. For physics and scene.
 #pragma once
 
-#include "filigree/physics/vectors.h"
+#include "filigree/physics/body.h"
 
 #include <algorithm>
 #include <cstring>

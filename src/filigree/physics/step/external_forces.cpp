@@ -1,6 +1,7 @@
 #include "filigree/physics/step/external_forces.h"
 
 #include "filigree/core/parallel_for.h"
+#include "filigree/physics/body/embedding.h"
 #include "filigree/physics/fem/cofactor.h"
 
 #include <algorithm>

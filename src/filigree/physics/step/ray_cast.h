@@ -1,8 +1,8 @@
 // The first thing that a ray meets. Private to the layer.
 #pragma once
 
+#include "filigree/physics/simulation.h"
 #include "filigree/physics/step/simulation_state.h"
-#include "filigree/physics/world_hit.h"
 
 namespace filigree {
 
