@@ -1,8 +1,8 @@
 // What a body that breaks costs as a whole: frames a second of a mesh that is thrown on the ground and goes to pieces
 // which touch each other. FILIGREE_SCAN names the mesh; a wavy sphere unless said.
+#include "filigree/file.h"
 #include "filigree/fracture.h"
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/simulation.h"
 
 #include <benchmark/benchmark.h>

@@ -1,7 +1,7 @@
 // What contacts cost: a frame of bodies that meet, with the part of it that contacts take. One thread, unless said.
 #include "heap.h"
 
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/simulation.h"
 

@@ -1,9 +1,7 @@
 // Space warps: time a vertex on one thread, for positions alone (a whole mesh) and with gradients (a driver).
 // Handles: factoring, and one round, on wavy sheets of 1,024 and 40,000 vertices held at two opposite sides.
-#include "filigree/deform/handles.h"
-#include "filigree/deform/space_warp.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
+#include "filigree/pose.h"
 
 #include <array>
 #include <benchmark/benchmark.h>

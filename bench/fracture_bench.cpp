@@ -1,9 +1,8 @@
 // What breaking a mesh costs, and how good what comes out is. FILIGREE_SCAN names the mesh; a wavy sphere unless said.
 // One thread. Times are of the cut: the surface, and what lies inside; reading, welding and naming pieces are apart.
+#include "filigree/file.h"
 #include "filigree/fracture.h"
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 
 #include <benchmark/benchmark.h>
 

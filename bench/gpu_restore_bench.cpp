@@ -1,12 +1,12 @@
 // Restoring in the vertex shader, against copying as many bytes within the GPU's memory in the same run. `shaded` draws
 // points that lie outside the picture: reading records and restoring them, and no more. `captured` writes positions and
 // normals to memory as well (transform feedback). Counters: vertices/s, bytes moved a vertex, fraction of the copy.
-#include "filigree/hierarchy/strip.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/shapes.h"
 #include "filigree/render.h"
 #include "filigree/render/gl_objects.h"
 #include "filigree/render/gpu_restore.h"
+#include "filigree/strip.h"
 
 #include <algorithm>
 #include <benchmark/benchmark.h>

@@ -4,7 +4,7 @@
 // A line each: speed and energy after the hit as parts of those before, the most energy at the end of any frame, and
 // the smallest volume ratio of a cell. Ends with 1 if energy grew by more than 1 % in any.
 #include "filigree/core/now_seconds.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/material.h"
 #include "filigree/physics/simulation.h"
 

@@ -2,7 +2,7 @@
 // particles. And what stitching costs: a ball of 200 k triangles whose upper half is new matter.
 #include "filigree/melting/composite_surface.h"
 #include "filigree/melting/field_surface.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 
 #include <benchmark/benchmark.h>
 

@@ -1,7 +1,7 @@
 // Reading and writing mesh files in memory, one thread. Rival: a copy of the same bytes.
 // FILIGREE_BENCH_MESH=FILE adds that file, read from disk cache, and written in every format.
+#include "filigree/file.h"
 #include "filigree/io/file.h"
-#include "filigree/io/mesh_file.h"
 
 #include <benchmark/benchmark.h>
 

@@ -1,10 +1,10 @@
 // The C++ half of bench/python_bench.py: does a task once for each line that it reads, and answers with the seconds.
 // Usage: python_pair MESH THREADS
-#include "filigree/deform/space_warp.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "filigree/physics/simulation.h"
+#include "filigree/pose.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 
 #include <chrono>
 #include <cstdlib>

@@ -2,8 +2,11 @@
 // the machine the restore uses. Counters: vertices/s, bytes moved a vertex, fraction of the triad.
 #include "interactive/triad.h"
 
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/hierarchy/blend_code.h"
+#include "filigree/mesh.h"
+#include "filigree/reference/height_law.h"
+#include "filigree/reference/reference_code.h"
+#include "filigree/strip.h"
 
 #include <benchmark/benchmark.h>
 #include <chrono>

@@ -7,7 +7,7 @@
 // frames that were not stepped stably, and seconds. Then what all falls together did. Ends with 1 if a cell was
 // inverted at the end of a frame, with 2 if a mesh could not be read.
 #include "filigree/core/now_seconds.h"
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "filigree/physics/material.h"
 #include "filigree/physics/simulation.h"
 

@@ -4,12 +4,10 @@
 //   strip_large against RESOLUTION   the same once in clusters, once in one piece
 //   strip_large quality MESH [N]     the largest part of a mesh, its triangles cut in four N times, and made rough
 #include "filigree/core/disjoint_sets.h"
-#include "filigree/deform/fidelity.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/mesh_distance.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
+#include "filigree/pose.h"
+#include "filigree/restore.h"
 
 #include <algorithm>
 #include <chrono>

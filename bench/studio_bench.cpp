@@ -3,7 +3,7 @@
 //   xvfb-run -a -s "-screen 0 1600x1200x24" build/release/bin/studio_bench MESH
 #include "script.h"
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <QApplication>
 #include <QElapsedTimer>

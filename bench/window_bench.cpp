@@ -2,12 +2,11 @@
 // vertices, 1280 x 800. The first argument that is no flag is the mesh's file; none: a wavy cube of as many triangles
 // as the Stanford dragon. `upload` is the graphics half of a drawable, `prepare` the other, which a window does in a
 // thread of its own. The column CPU is all threads together: what stays the same when others use the processor too.
-#include "filigree/hierarchy/strip.h"
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/ray_hit.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
 #include "filigree/render.h"
+#include "filigree/strip.h"
 
 #include <benchmark/benchmark.h>
 #include <cstdio>

@@ -1,6 +1,6 @@
 // A world that changes while it runs: stones are thrown in, hits are heard, a plate sweeps them off, what fell is
 // removed.
-#include <filigree/mesh/shapes.h>
+#include <filigree/mesh.h>
 #include <filigree/physics/material.h>
 #include <filigree/physics/simulation.h>
 

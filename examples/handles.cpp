@@ -1,9 +1,5 @@
 // Pull a part by hand: the driver follows as rigidly as it can, and takes the detail along.
-#include <filigree/deform/handles.h>
-#include <filigree/hierarchy/restore.h>
-#include <filigree/hierarchy/strip.h>
-#include <filigree/mesh/shapes.h>
-#include <filigree/mesh/triangulate.h>
+#include <filigree/filigree.h>
 
 #include <cstdio>
 

@@ -1,6 +1,5 @@
 // What a mesh is made of, and what is wrong with it, with places.
-#include <filigree/mesh/shapes.h>
-#include <filigree/mesh/topology.h>
+#include <filigree/filigree.h>
 
 #include <array>
 #include <cstdio>

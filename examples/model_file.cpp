@@ -1,8 +1,5 @@
 // A stripped mesh in a file: write it, read it, restore from it; a damaged file is refused with a reason.
-#include <filigree/hierarchy/restore.h>
-#include <filigree/hierarchy/strip.h>
-#include <filigree/io/model_file.h>
-#include <filigree/mesh/shapes.h>
+#include <filigree/filigree.h>
 
 #include <cstdio>
 

@@ -1,8 +1,6 @@
 // Any mesh as quads with subdivision levels: remeshed, stripped with the report's code, restored.
-#include <filigree/mesh/shapes.h>
-#include <filigree/mesh/triangulate.h>
-#include <filigree/reference/reference_model.h>
-#include <filigree/remesh/quad_remesh.h>
+#include <filigree/filigree.h>
+#include <filigree/reference.h>
 
 #include <algorithm>
 #include <cstdio>

@@ -1,7 +1,7 @@
 // The report's experiment: remove the detail of the wavy cube level by level down to its corners, stretch what is left,
 // return the detail.
-#include <filigree/mesh/shapes.h>
-#include <filigree/reference/reference_model.h>
+#include <filigree/mesh.h>
+#include <filigree/reference.h>
 
 #include <algorithm>
 #include <cmath>

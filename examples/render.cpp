@@ -1,7 +1,6 @@
 // Draws a mesh into a PNG file, without a window.
-#include "filigree/render.h"
-#include "filigree/io/file.h"
-#include "filigree/mesh/shapes.h"
+#include <filigree/filigree.h>
+#include <filigree/render.h>
 
 #include <iostream>
 

@@ -1,7 +1,5 @@
 // Another program moved the driver and handed back positions alone: the gradients are estimated from them.
-#include <filigree/hierarchy/restore.h>
-#include <filigree/hierarchy/strip.h>
-#include <filigree/mesh/shapes.h>
+#include <filigree/filigree.h>
 
 #include <cmath>
 #include <cstdio>

@@ -1,8 +1,8 @@
 // A body made of a mesh falls on the ground; the driver goes along, and takes the detail with it.
-#include <filigree/hierarchy/restore.h>
-#include <filigree/hierarchy/strip.h>
-#include <filigree/mesh/shapes.h>
+#include <filigree/mesh.h>
 #include <filigree/physics/simulation.h>
+#include <filigree/restore.h>
+#include <filigree/strip.h>
 
 #include <cstdio>
 

@@ -1,7 +1,5 @@
 // Deformations of space know their own gradients, and chain.
-#include <filigree/deform/space_warp.h>
-#include <filigree/mesh/shapes.h>
-#include <filigree/mesh/topology.h>
+#include <filigree/filigree.h>
 
 #include <cmath>
 #include <cstdio>

@@ -1,8 +1,8 @@
 // The report's figures, drawn by the program from what it computes.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 #include "filigree/present/page.h"
 #include "filigree/render.h"
 

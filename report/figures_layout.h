@@ -3,7 +3,7 @@
 
 #include "figures.h"
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <string>
 #include <vector>

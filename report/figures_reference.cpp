@@ -2,7 +2,7 @@
 #include "figures.h"
 #include "figures_layout.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/reference/reference_code.h"
 
 #include <algorithm>

@@ -3,16 +3,15 @@
 #include "figures_layout.h"
 
 #include "filigree/core/text.h"
-#include "filigree/deform/space_warp.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/mesh_distance.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/reference/reference_model.h"
+#include "filigree/mesh.h"
+#include "filigree/pose.h"
+#include "filigree/reference.h"
 #include "filigree/render.h"
+#include "filigree/restore.h"
 #include "filigree/sample.h"
 #include "filigree/sample/closure.h"
 #include "filigree/sample/inside_rays.h"
+#include "filigree/strip.h"
 
 #include "interactive/fidelity.h"
 

@@ -3,14 +3,13 @@
 #include "figures_layout.h"
 
 #include "filigree/core/text.h"
-#include "filigree/deform/space_warp.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/mesh_distance.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/pose.h"
 #include "filigree/present/patch_drawing.h"
-#include "filigree/reference/reference_model.h"
-#include "filigree/remesh/quad_remesh.h"
+#include "filigree/reference.h"
+#include "filigree/remesh.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 
 #include <cmath>
 

@@ -3,13 +3,14 @@
 #include "figures_layout.h"
 
 #include "filigree/core/text.h"
-#include "filigree/deform/space_warp.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
+#include "filigree/hierarchy/blend_code.h"
 #include "filigree/melting/particle_field.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/surfels.h"
+#include "filigree/pose.h"
+#include "filigree/restore.h"
 #include "filigree/sample.h"
+#include "filigree/strip.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,7 @@
 // Meshes that check_mesh refuses, and one that was moved from: what every public call has to survive.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 
 #include <cmath>
 #include <string>

@@ -1,7 +1,7 @@
 // Threads that tests run on.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,5 @@
 #include "animation_output.h"
+#include "filigree/io/point_cache.h"
 #include "restore_options.h"
 
 #include <set>

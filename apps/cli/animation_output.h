@@ -3,10 +3,10 @@
 
 #include "session.h"
 
-#include "filigree/hierarchy/restore.h"
-#include "filigree/io/gltf_export.h"
+#include "filigree/file.h"
 #include "filigree/io/model_chunks.h"
 #include "filigree/io/point_cache.h"
+#include "filigree/restore.h"
 
 namespace filigree::cli {
 

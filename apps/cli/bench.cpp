@@ -1,8 +1,8 @@
 #include "commands.h"
 #include "session.h"
 
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 
 #include "interactive/measure.h"
 

@@ -1,12 +1,13 @@
 #include "coding_report.h"
 
 #include "filigree/core/text.h"
+#include "filigree/io/model_file.h"
 
 #include <fmt/format.h>
 
 namespace filigree::cli {
 
-void add_coding_shares(const CodedBytes& parts, std::size_t vertices, std::optional<std::uint64_t> bytes,
+void add_coding_shares(const PackedBytes& parts, std::size_t vertices, std::optional<std::uint64_t> bytes,
                        Report& report) {
     Json& shares = report.set("bits_per_vertex");
     shares = Json::object();
@@ -36,7 +37,7 @@ void add_stream_marks(const ModelOutline& model, Report& report) {
     Json& marks = report.set("stream");
     marks = Json::array();
     std::string lines = "\n       bytes   of all   vertices   surface error (rms, model units)\n";
-    for (const CodedLevelMark& mark : model.coding->levels) {
+    for (const PackedLevelMark& mark : model.coding->levels) {
         const double share = double(mark.bytes) / double(std::max<std::uint64_t>(model.bytes, 1));
         lines += fmt::format("{:>12} {:>7.1f}% {:>10} {:>10.2g}\n", with_commas(mark.bytes), 100 * share,
                              with_commas(mark.vertices), mark.error);

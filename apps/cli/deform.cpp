@@ -5,6 +5,7 @@
 #include "restore_options.h"
 
 #include "filigree/deform/warp_steps.h"
+#include "filigree/io/file.h"
 #include "filigree/io/handles_file.h"
 
 #include <fmt/format.h>

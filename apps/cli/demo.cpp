@@ -3,10 +3,9 @@
 #include "output_folder.h"
 #include "restore_options.h"
 
-#include "filigree/deform/space_warp.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/mesh_distance.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/pose.h"
+#include "filigree/strip.h"
 
 #include <algorithm>
 #include <cmath>

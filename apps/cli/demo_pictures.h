@@ -3,8 +3,8 @@
 
 #include "pictures.h"
 
-#include "filigree/hierarchy/restore.h"
-#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh.h"
+#include "filigree/restore.h"
 
 #include <string>
 

@@ -5,10 +5,12 @@
 #include "restore_options.h"
 #include "web_page.h"
 
+#include "filigree/file.h"
 #include "filigree/io/file.h"
 #include "filigree/io/gltf.h"
-#include "filigree/io/gltf_export.h"
 #include "filigree/io/material_file.h"
+#include "filigree/io/model_file.h"
+#include "filigree/io/point_cache.h"
 
 #include <filesystem>
 
@@ -112,9 +114,9 @@ void export_stream(const Model& model, const PoseSequence& own, const ExportArgu
         embedding->mesh.material_files.clear();
     }
     session.begin_writing(options.output);
-    const CodingReport coding =
-        require(write_coded_model(embedding ? *embedding : model, poses, {.bits = options.bits, .levels = true},
-                                  options.output, session.context()));
+    const PackReport coding =
+        require(pack_model(embedding ? *embedding : model, poses, {.bits = options.bits, .levels = true},
+                           options.output, session.context()));
     const auto bytes = fs::file_size(options.output);
     report.set("vertices", model.vertex_count());
     report.count("frames", "frames", poses.frames.size());

@@ -2,9 +2,11 @@
 #include "commands.h"
 #include "session.h"
 
-#include "filigree/deform/fidelity.h"
+#include "filigree/io/file.h"
 #include "filigree/io/gltf.h"
-#include "filigree/mesh/topology.h"
+#include "filigree/io/model_file.h"
+#include "filigree/mesh.h"
+#include "filigree/pose.h"
 #include "filigree/remesh/quad_quality.h"
 #include "filigree/sample.h"
 
@@ -163,7 +165,7 @@ Json vertices_json(const std::vector<Index>& ids) {
 
 /// What a coded file spends its bits on.
 void describe_coding(const ModelOutline& model, Report& report) {
-    const Coding& coding = *model.coding;
+    const Packing& coding = *model.coding;
     report.add("coded",
                fmt::format("{} bits{}{}{}", coding.options.bits, coding.options.levels ? ", as a stream" : "",
                            coding.options.surface ? ", by surface" : "",

@@ -3,6 +3,7 @@
 #include "session.h"
 
 #include "filigree/hierarchy/pose_mesh.h"
+#include "filigree/io/file.h"
 
 namespace filigree::cli {
 

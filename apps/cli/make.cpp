@@ -1,7 +1,7 @@
 #include "commands.h"
 #include "session.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 
 namespace filigree::cli {
 

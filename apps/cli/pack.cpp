@@ -2,8 +2,10 @@
 #include "commands.h"
 #include "session.h"
 
-#include "filigree/hierarchy/strip.h"
-#include "filigree/io/model_stream.h"
+#include "filigree/io/file.h"
+#include "filigree/io/model_file.h"
+#include "filigree/pack.h"
+#include "filigree/strip.h"
 
 #include <fmt/format.h>
 
@@ -17,14 +19,14 @@ struct PackArguments {
     std::string input, output;
     std::optional<std::size_t> base;
     Profile profile = Profile::compact;
-    MeshCodeOptions code;
+    PackOptions code;
 };
 
 std::uint64_t size_of(const std::string& path) {
     return std::filesystem::is_regular_file(path) ? std::uint64_t(std::filesystem::file_size(path)) : 0;
 }
 
-void report_coding(const Model& model, const CodingReport& coding, const PackArguments& options, double seconds,
+void report_coding(const Model& model, const PackReport& coding, const PackArguments& options, double seconds,
                    Report& report) {
     const double diagonal = world_bounds(model.mesh).diagonal();
     const double share = diagonal > 0 ? 1 / diagonal : 0;
@@ -74,7 +76,7 @@ Model model_of(const PackArguments& options, Session& session, PoseSequence& pos
 /// Codes the model bit for bit, reads it back, and says how much smaller it became.
 void pack_lossless(const Model& model, const PoseSequence& poses, const PackArguments& options, Session& session) {
     const double start = now_seconds();
-    const LosslessReport coding = require(write_lossless_model(model, poses, options.output, session.context()));
+    const LosslessPackReport coding = require(pack_model_lossless(model, poses, options.output, session.context()));
     const double seconds = now_seconds() - start;
     const std::uint64_t bytes = size_of(options.output);
     Report report;
@@ -103,7 +105,7 @@ void run(PackArguments options, Session& session) {
     if (mesh_format(options.output).ok())
         refuse(options.output + ": is the name of a mesh; give the model another, such as NAME.fil.");
     options.code.levels = options.profile == Profile::stream;
-    if (options.profile == Profile::lossless && options.code != MeshCodeOptions())
+    if (options.profile == Profile::lossless && options.code != PackOptions())
         refuse("--bits, --surface and --keep-order are for what rounds; --profile lossless keeps every number and "
                "their order.");
     PoseSequence poses;
@@ -111,8 +113,7 @@ void run(PackArguments options, Session& session) {
     session.begin_writing(options.output);
     if (options.profile == Profile::lossless) return pack_lossless(model, poses, options, session);
     const double start = now_seconds();
-    const CodingReport coding =
-        require(write_coded_model(model, poses, options.code, options.output, session.context()));
+    const PackReport coding = require(pack_model(model, poses, options.code, options.output, session.context()));
     Report report;
     report_coding(model, coding, options, now_seconds() - start, report);
     if (coding.lacks_level_attributes) session.warn(kLevelsLackAttributes);

@@ -3,6 +3,8 @@
 #include "report.h"
 
 #include "filigree/core/now_seconds.h"
+#include "filigree/io/file.h"
+#include "filigree/reference/height_law.h"
 
 #include <fmt/format.h>
 

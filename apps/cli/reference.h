@@ -3,6 +3,7 @@
 
 #include "session.h"
 
+#include "filigree/io/file.h"
 #include "filigree/io/reference_file.h"
 
 namespace filigree::cli {

@@ -3,7 +3,7 @@
 #include "session.h"
 
 #include "filigree/present/patch_drawing.h"
-#include "filigree/remesh/quad_remesh.h"
+#include "filigree/remesh.h"
 
 #include <fmt/format.h>
 

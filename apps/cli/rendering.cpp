@@ -1,4 +1,6 @@
 #include "rendering.h"
+#include "filigree/hierarchy/blend_code.h"
+#include "filigree/io/file.h"
 
 #include <utility>
 

@@ -4,6 +4,7 @@
 #include "pictures.h"
 #include "restore_options.h"
 
+#include "filigree/io/file.h"
 #include "filigree/mesh/surfels.h"
 #include "filigree/present/film_extent.h"
 #include "filigree/present/page.h"

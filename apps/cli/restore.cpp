@@ -5,7 +5,10 @@
 #include "reference.h"
 #include "restore_options.h"
 
+#include "filigree/hierarchy/blend_code.h"
 #include "filigree/hierarchy/vertex_order.h"
+#include "filigree/io/file.h"
+#include "filigree/io/point_cache.h"
 #include "filigree/io/pose_match.h"
 #include "filigree/mesh/surfels.h"
 #include "filigree/present/error_picture.h"

@@ -4,9 +4,8 @@
 #include "report.h"
 #include "session.h"
 
-#include "filigree/hierarchy/pose_error.h"
 #include "filigree/hierarchy/pose_mesh.h"
-#include "filigree/hierarchy/restore.h"
+#include "filigree/restore.h"
 
 namespace filigree::cli {
 

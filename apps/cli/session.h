@@ -4,15 +4,15 @@
 #include "options.h"
 #include "report.h"
 
+#include "filigree/context.h"
 #include "filigree/core/now_seconds.h"
-#include "filigree/core/result.h"
-#include "filigree/core/run_context.h"
-#include "filigree/hierarchy/model.h"
-#include "filigree/hierarchy/pose.h"
+#include "filigree/file.h"
+#include "filigree/io/file.h"
 #include "filigree/io/gltf.h"
-#include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
-#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh.h"
+#include "filigree/result.h"
+#include "filigree/strip.h"
 
 #include <optional>
 #include <string>

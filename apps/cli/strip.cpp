@@ -3,7 +3,7 @@
 #include "session.h"
 #include "spill.h"
 
-#include "filigree/deform/fidelity.h"
+#include "filigree/pose.h"
 
 #include <filesystem>
 

@@ -4,7 +4,7 @@
 #include "jobs.h"
 #include "pins.h"
 
-#include "filigree/deform/pull.h"
+#include "filigree/pose.h"
 
 #include <algorithm>
 #include <chrono>

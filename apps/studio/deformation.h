@@ -3,8 +3,8 @@
 
 #include "document.h"
 
-#include "filigree/deform/pull.h"
 #include "filigree/deform/unwarp.h"
+#include "filigree/pose.h"
 
 #include <QObject>
 

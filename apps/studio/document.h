@@ -2,13 +2,11 @@
 #pragma once
 
 #include "filigree/deform/warp_steps.h"
-#include "filigree/hierarchy/pose.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/topology.h"
+#include "filigree/mesh.h"
 #include "filigree/render/surface_materials.h"
+#include "filigree/restore.h"
 #include "filigree/scene/dropped_body.h"
+#include "filigree/strip.h"
 
 #include <QObject>
 #include <QUndoStack>

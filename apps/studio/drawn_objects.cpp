@@ -4,8 +4,8 @@
 #include "theme.h"
 
 #include "filigree/deform/carried_points.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/ray_hit.h"
-#include "filigree/mesh/triangulate.h"
 #include "filigree/present/patch_surface.h"
 #include "filigree/present/textured_look.h"
 

@@ -4,8 +4,8 @@
 #include "document.h"
 #include "jobs.h"
 
-#include "filigree/hierarchy/pose_error.h"
 #include "filigree/render.h"
+#include "filigree/restore.h"
 
 #include <QTimer>
 

@@ -1,8 +1,8 @@
 // Work off the main thread: one at a time, with progress and cancel.
 #pragma once
 
-#include "filigree/core/result.h"
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
+#include "filigree/result.h"
 
 #include <QObject>
 #include <QString>

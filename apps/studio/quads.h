@@ -3,7 +3,7 @@
 
 #include "document.h"
 
-#include "filigree/remesh/quad_remesh.h"
+#include "filigree/remesh.h"
 
 #include <QString>
 

@@ -9,8 +9,8 @@
 #include "playback.h"
 #include "view.h"
 
-#include "filigree/mesh/mesh_distance.h"
-#include "filigree/remesh/quad_remesh.h"
+#include "filigree/mesh.h"
+#include "filigree/remesh.h"
 
 namespace filigree::studio {
 

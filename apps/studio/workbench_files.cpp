@@ -4,13 +4,13 @@
 #include "pins.h"
 #include "words.h"
 
+#include "filigree/file.h"
 #include "filigree/hierarchy/pose_mesh.h"
 #include "filigree/io/file.h"
-#include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
-#include "filigree/io/model_stream.h"
 #include "filigree/io/numbered_name.h"
 #include "filigree/io/point_cache.h"
+#include "filigree/pack.h"
 #include "filigree/present/model_film.h"
 
 #include <algorithm>

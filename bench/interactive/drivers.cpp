@@ -2,9 +2,9 @@
 
 #include "timing.h"
 
-#include "filigree/deform/fidelity.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh.h"
+#include "filigree/pose.h"
+#include "filigree/restore.h"
 
 #include <algorithm>
 #include <array>

@@ -5,7 +5,7 @@
 #include "measurement.h"
 #include "named_mesh.h"
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 
 namespace filigree::bench {
 

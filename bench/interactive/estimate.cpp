@@ -2,10 +2,9 @@
 
 #include "random_warps.h"
 
-#include "filigree/hierarchy/pose_error.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,9 @@
 #include "fidelity.h"
 
 #include "filigree/core/parallel_for.h"
-#include "filigree/deform/fidelity.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh.h"
+#include "filigree/pose.h"
+#include "filigree/restore.h"
 
 #include <cmath>
 #include <functional>

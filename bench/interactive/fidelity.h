@@ -1,9 +1,8 @@
 // How close restored detail comes to deforming the whole mesh, beside what others do with the same driver.
 #pragma once
 
-#include "filigree/hierarchy/model.h"
-#include "filigree/hierarchy/pose.h"
-#include "filigree/reference/reference_model.h"
+#include "filigree/reference.h"
+#include "filigree/strip.h"
 
 #include <string>
 #include <vector>

@@ -10,15 +10,13 @@
 #include "triad.h"
 
 #include "filigree/coding/mesh_code.h"
-#include "filigree/deform/handles.h"
-#include "filigree/deform/space_warp.h"
+#include "filigree/file.h"
 #include "filigree/hierarchy/blend_code.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
+#include "filigree/pose.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 
 #include <array>
 #include <cstring>
@@ -85,14 +83,14 @@ public:
         for (const unsigned bits : {12u, 14u})
             for (const bool levels : {false, true}) {
                 const std::string name = (levels ? "coding.stream_" : "coding.") + std::to_string(bits);
-                MeshCodeReport report;
-                CodedMesh coded;
+                PackedMeshReport report;
+                PackedMesh coded;
                 const double encode = median_seconds(
-                    [&] { coded = encode_mesh(mesh_, {.bits = bits, .levels = levels}, &report, context_).value(); });
-                const double decode = median_seconds([&] { (void)decode_mesh(coded, context_).value(); });
+                    [&] { coded = pack_mesh(mesh_, {.bits = bits, .levels = levels}, &report, context_).value(); });
+                const double decode = median_seconds([&] { (void)unpack_mesh(coded, context_).value(); });
                 std::size_t bytes = coded.connectivity.size() + coded.places.size() + coded.levels.connectivity.size() +
                                     coded.levels.places.size();
-                for (const CodedLevel& level : coded.levels.levels)
+                for (const PackedLevel& level : coded.levels.levels)
                     bytes += level.splits.size() + level.refinement.size();
                 add(name + "_bits", 8 * double(bytes) / vertices, "bits/vertex");
                 add(name + "_rms", report.rms / diagonal, "of the diagonal");

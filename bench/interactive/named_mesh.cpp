@@ -1,6 +1,6 @@
 #include "named_mesh.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 
 namespace filigree::bench {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 #include <string>
 

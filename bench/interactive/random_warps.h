@@ -1,7 +1,7 @@
 // Deformations drawn at random, to judge what was calibrated on others.
 #pragma once
 
-#include "filigree/deform/space_warp.h"
+#include "filigree/pose.h"
 
 #include <string>
 

@@ -5,10 +5,10 @@
 #include "filigree/physics/body/make_cells.h"
 #include "timing.h"
 
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/physics/simulation.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 
 #include <cmath>
 #include <numbers>

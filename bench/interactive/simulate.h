@@ -3,8 +3,8 @@
 
 #include "measurement.h"
 
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 
 #include <optional>
 #include <vector>

@@ -9,10 +9,10 @@
 // body (physics/world.h) breaks along the same cells. Next: piece_mesh for single pieces, file.h to write them.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/core/types.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 #include "filigree/sample.h"
+#include "filigree/types.h"
 
 #include <memory>
 #include <optional>

@@ -13,14 +13,12 @@
 // pixel and lights the scene from one direction, with a shadow map; the mean is antialiased, with soft shadows.
 #pragma once
 
-#include "filigree/core/result.h"
-#include "filigree/core/run_context.h"
-#include "filigree/core/types.h"
-#include "filigree/core/view.h"
-#include "filigree/hierarchy/model.h"
-#include "filigree/hierarchy/pose.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
+#include "filigree/restore.h"
+#include "filigree/result.h"
+#include "filigree/strip.h"
+#include "filigree/types.h"
 
 #include <Eigen/Geometry>
 #include <array>

@@ -11,9 +11,9 @@
 // the mesh's origin, in model units.
 #pragma once
 
-#include "filigree/core/result.h"
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
+#include "filigree/result.h"
 
 #include <array>
 #include <bit>

@@ -3,10 +3,10 @@
 #include "cases.h"
 #include "threads.h"
 
-#include "filigree/hierarchy/strip.h"
 #include "filigree/io/model_file.h"
 #include "filigree/io/point_cache.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/strip.h"
 
 #include <algorithm>
 #include <cmath>

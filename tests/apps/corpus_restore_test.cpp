@@ -2,10 +2,10 @@
 #include "io/corpus.h"
 #include "sanitized.h"
 
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "filigree/io/model_file.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 
 #include <gtest/gtest.h>
 

@@ -2,12 +2,12 @@
 #include "apps/program.h"
 #include "threads.h"
 
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "filigree/io/model_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/render.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 
 #include <numbers>
 

@@ -3,7 +3,7 @@
 #include "cases.h"
 #include "threads.h"
 
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "filigree/io/model_file.h"
 #include "filigree/physics/simulation.h"
 #include "filigree/render.h"

@@ -9,9 +9,9 @@ namespace filigree {
 namespace {
 
 TEST(CheckedCoding, WhatIsBrokenIsRefused) {
-    FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED([](const Mesh& m) { return encode_mesh(m, {}, nullptr, kOneThread); });
+    FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED([](const Mesh& m) { return pack_mesh(m, {}, nullptr, kOneThread); });
     FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED(
-        [](const Mesh& m) { return encode_mesh(m, {.levels = true}, nullptr, kOneThread); });
+        [](const Mesh& m) { return pack_mesh(m, {.levels = true}, nullptr, kOneThread); });
 }
 
 } // namespace

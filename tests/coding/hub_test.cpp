@@ -114,9 +114,9 @@ TEST(Hubs, FansArePackedInTime) {
         for (const bool each_corner_its_own : {true, false})
             for (const bool levels : {false, true}) {
                 const Mesh fan = with_uvs(fan_mesh(levels ? kSpokes / 4 : kSpokes, hub_is_first), each_corner_its_own);
-                const CodedMesh coded =
-                    encode_mesh(fan, {.keep_order = true, .levels = levels}, nullptr, kAllThreads).value();
-                const Mesh back = decode_mesh(coded, kAllThreads).value();
+                const PackedMesh coded =
+                    pack_mesh(fan, {.keep_order = true, .levels = levels}, nullptr, kAllThreads).value();
+                const Mesh back = unpack_mesh(coded, kAllThreads).value();
                 EXPECT_EQ(back.corners, fan.corners);
                 ASSERT_EQ(back.uvs.corners.size(), fan.uvs.corners.size());
                 double furthest = 0;

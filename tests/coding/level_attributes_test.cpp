@@ -1,7 +1,8 @@
 // Texture coordinates, materials and colours in levels: every corner of every level has those of the surface, seams
 // stay seams, and the whole is what was written.
+#include "filigree/coding/mesh_code.h"
 #include "filigree/coding/mesh_levels.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>
@@ -41,11 +42,11 @@ Mesh tube(bool has_colors = true) {
     return mesh;
 }
 
-CodedMesh frames_of(const Mesh& mesh) {
-    return encode_mesh(mesh, {.keep_order = true, .levels = true}, nullptr, kTwoThreads).value();
+PackedMesh frames_of(const Mesh& mesh) {
+    return pack_mesh(mesh, {.keep_order = true, .levels = true}, nullptr, kTwoThreads).value();
 }
 
-LevelReader reader_of(const CodedMesh& code) {
+LevelReader reader_of(const PackedMesh& code) {
     const LevelCodeOptions options = level_options(code.options);
     LevelReader reader(options.steps, options.is_refined, std::size_t{1} << 24);
     EXPECT_TRUE(reader.read_coarsest(code.levels.connectivity, code.levels.places, code.levels.attributes));
@@ -75,9 +76,9 @@ void expect_same_attributes(const Mesh& mesh, const Mesh& read) {
 }
 
 void expect_round_trip(const Mesh& mesh) {
-    const CodedMesh code = frames_of(mesh);
+    const PackedMesh code = frames_of(mesh);
     EXPECT_FALSE(code.levels.attributes.empty());
-    expect_same_attributes(mesh, decode_mesh(code, kTwoThreads).value());
+    expect_same_attributes(mesh, unpack_mesh(code, kTwoThreads).value());
 }
 
 } // namespace
@@ -96,7 +97,7 @@ TEST(LevelAttributes, TheWholeIsWhatWasWritten) {
 }
 
 TEST(LevelAttributes, EveryLevelHasThoseOfTheSurface) {
-    const CodedMesh code = frames_of(tube());
+    const PackedMesh code = frames_of(tube());
     LevelReader reader = reader_of(code);
     for (std::size_t k = 0; k <= code.levels.levels.size(); ++k) {
         const Mesh level = mesh_of_levels(reader, code);
@@ -147,10 +148,10 @@ TEST(LevelAttributes, SeamsEverywhereLeaveTheLevelsWithout) {
         mesh.uvs.corners[c] = static_cast<Index>(c);
         mesh.uvs.values.emplace_back(float(c / 4 % 50) / 50 + 0.01f * float(c % 2), float(c / 200) / 60);
     }
-    const CodedMesh code = frames_of(mesh);
+    const PackedMesh code = frames_of(mesh);
     EXPECT_TRUE(code.levels.attributes.empty());
     EXPECT_LT(code.levels.vertices, 600u);
-    expect_same_attributes(mesh, decode_mesh(code, kTwoThreads).value());
+    expect_same_attributes(mesh, unpack_mesh(code, kTwoThreads).value());
 }
 
 TEST(LevelAttributes, AMeshWithoutAnyIsCodedWithoutThem) {
@@ -158,10 +159,10 @@ TEST(LevelAttributes, AMeshWithoutAnyIsCodedWithoutThem) {
 }
 
 TEST(LevelAttributes, DamageIsNamedOrHarmless) {
-    const CodedMesh code = frames_of(tube());
+    const PackedMesh code = frames_of(tube());
     std::mt19937 random(5);
-    const auto try_it = [&](const CodedMesh& damaged) {
-        const Result<Mesh> read = decode_mesh(damaged, kTwoThreads);
+    const auto try_it = [&](const PackedMesh& damaged) {
+        const Result<Mesh> read = unpack_mesh(damaged, kTwoThreads);
         if (read)
             EXPECT_EQ(check_mesh(*read), "");
         else
@@ -171,25 +172,25 @@ TEST(LevelAttributes, DamageIsNamedOrHarmless) {
         if (!reader.read_coarsest(damaged.levels.connectivity, damaged.levels.places, damaged.levels.attributes))
             return;
         EXPECT_EQ(check_mesh(mesh_of_levels(reader, damaged)), "");
-        for (const CodedLevel& level : damaged.levels.levels) {
+        for (const PackedLevel& level : damaged.levels.levels) {
             if (!reader.read_level(level.splits, level.batches)) return;
             EXPECT_EQ(check_mesh(mesh_of_levels(reader, damaged)), "");
         }
     };
     const auto change = [&](std::string& bytes) { bytes[random() % bytes.size()] ^= char(1 + random() % 255); };
     for (int k = 0; k < 300; ++k) {
-        CodedMesh damaged = code;
+        PackedMesh damaged = code;
         change(k % 3 == 0   ? damaged.levels.attributes
                : k % 3 == 1 ? damaged.levels.levels[std::size_t(k) % code.levels.levels.size()].splits
                             : damaged.attributes);
         try_it(damaged);
     }
     for (const std::size_t size : {std::size_t{1}, code.levels.attributes.size() / 2}) {
-        CodedMesh cut = code;
+        PackedMesh cut = code;
         cut.levels.attributes.resize(size);
-        EXPECT_FALSE(decode_mesh(cut, kTwoThreads).ok());
+        EXPECT_FALSE(unpack_mesh(cut, kTwoThreads).ok());
     }
-    CodedMesh other = code; // of another mesh
+    PackedMesh other = code; // of another mesh
     other.levels.attributes = frames_of(tube(false)).levels.attributes;
     try_it(other);
 }

@@ -1,9 +1,9 @@
 // A mesh in levels: what a reader has is what was written; every beginning of the streams is a closed map; each level
 // is nearer; damage is named.
 #include "filigree/coding/coarsening.h"
+#include "filigree/coding/mesh_code.h"
 #include "filigree/coding/mesh_levels.h"
-#include "filigree/mesh/mesh_distance.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "threads.h"
 
 #include <array>
@@ -14,11 +14,11 @@ using namespace filigree;
 
 namespace {
 
-CodedMesh frames_of(const Mesh& mesh, bool surface = false) {
-    return encode_mesh(mesh, {.surface = surface, .levels = true}, nullptr, kTwoThreads).value();
+PackedMesh frames_of(const Mesh& mesh, bool surface = false) {
+    return pack_mesh(mesh, {.surface = surface, .levels = true}, nullptr, kTwoThreads).value();
 }
 
-LevelReader reader_of(const CodedMesh& code) {
+LevelReader reader_of(const PackedMesh& code) {
     const LevelCodeOptions options = level_options(code.options);
     return {options.steps, options.is_refined, std::size_t{1} << 24};
 }
@@ -52,7 +52,7 @@ Mesh bumpy_sheet() { // a border, and two holes in it
 
 TEST(LevelCode, EveryLevelIsNearer) {
     for (const Mesh& mesh : {make_wavy_sphere({.resolution = 48}), bumpy_sheet()}) {
-        const CodedMesh code = frames_of(mesh);
+        const PackedMesh code = frames_of(mesh);
         LevelReader reader = reader_of(code);
         ASSERT_TRUE(reader.read_coarsest(code.levels.connectivity, code.levels.places));
         EXPECT_LE(reader.map().vertex_count(), 520u);
@@ -61,7 +61,7 @@ TEST(LevelCode, EveryLevelIsNearer) {
         };
         double before = error();
         ASSERT_GE(code.levels.levels.size(), 2u);
-        for (const CodedLevel& level : code.levels.levels) {
+        for (const PackedLevel& level : code.levels.levels) {
             ASSERT_TRUE(reader.read_level(level.splits, level.batches));
             EXPECT_EQ(reader.map().vertex_count(), level.vertices);
             EXPECT_EQ(reader.map().triangles.size(), level.triangles);
@@ -70,7 +70,7 @@ TEST(LevelCode, EveryLevelIsNearer) {
             EXPECT_LT(now, 1.05 * before);
             before = now;
         }
-        for (const CodedLevel& level : code.levels.levels) ASSERT_TRUE(reader.refine_level(level.refinement));
+        for (const PackedLevel& level : code.levels.levels) ASSERT_TRUE(reader.refine_level(level.refinement));
         EXPECT_LT(error(), code.step); // quads may be cut along their other diagonal
         EXPECT_FALSE(reader.refine_level("")) << "all of them are refined";
     }
@@ -78,7 +78,7 @@ TEST(LevelCode, EveryLevelIsNearer) {
 
 TEST(LevelCode, BordersStayWhereTheyAre) {
     const Mesh mesh = bumpy_sheet();
-    const CodedMesh code = frames_of(mesh);
+    const PackedMesh code = frames_of(mesh);
     LevelReader reader = reader_of(code);
     ASSERT_TRUE(reader.read_coarsest(code.levels.connectivity, code.levels.places));
     const Box box = bounds(mesh_of_levels(reader, code).positions);
@@ -120,7 +120,7 @@ TEST(LevelCode, ABatchCanBeTakenBackInAnyOrder) {
 
 TEST(LevelCode, OneThreadOrMany) {
     const Mesh mesh = make_wavy_sphere({.resolution = 40});
-    const CodedMesh one = encode_mesh(mesh, {.levels = true}, nullptr, RunContext(1)).value(), many = frames_of(mesh);
+    const PackedMesh one = pack_mesh(mesh, {.levels = true}, nullptr, RunContext(1)).value(), many = frames_of(mesh);
     ASSERT_EQ(one.levels.levels.size(), many.levels.levels.size());
     for (std::size_t k = 0; k < one.levels.levels.size(); ++k)
         EXPECT_EQ(one.levels.levels[k].splits, many.levels.levels[k].splits);
@@ -128,28 +128,28 @@ TEST(LevelCode, OneThreadOrMany) {
 
 TEST(LevelCode, DamageIsNamedOrHarmless) {
     const Mesh mesh = make_wavy_sphere({.resolution = 16});
-    const CodedMesh code = frames_of(mesh);
+    const PackedMesh code = frames_of(mesh);
     std::mt19937 random(3);
-    const auto try_it = [&](const CodedMesh& damaged) {
-        const Result<Mesh> read = decode_mesh(damaged, kTwoThreads);
+    const auto try_it = [&](const PackedMesh& damaged) {
+        const Result<Mesh> read = unpack_mesh(damaged, kTwoThreads);
         if (read)
             EXPECT_EQ(check_mesh(*read), "");
         else
             EXPECT_EQ(read.error().code, ErrorCode::bad_file);
     };
     for (std::size_t k = 0; k < code.levels.levels.size(); ++k)
-        for (std::string CodedLevel::*part : {&CodedLevel::splits, &CodedLevel::refinement}) {
+        for (std::string PackedLevel::*part : {&PackedLevel::splits, &PackedLevel::refinement}) {
             const std::string& bytes = code.levels.levels[k].*part;
             for (std::size_t at = 0; at < bytes.size(); at += 1 + bytes.size() / 100) {
-                CodedMesh damaged = code;
+                PackedMesh damaged = code;
                 (damaged.levels.levels[k].*part)[at] = char(bytes[at] ^ char(1 + random() % 255));
                 try_it(damaged);
             }
-            CodedMesh cut = code;
+            PackedMesh cut = code;
             (cut.levels.levels[k].*part).resize(bytes.size() / 2);
-            EXPECT_FALSE(decode_mesh(cut, kTwoThreads).ok());
+            EXPECT_FALSE(unpack_mesh(cut, kTwoThreads).ok());
         }
-    CodedMesh longer = code;
+    PackedMesh longer = code;
     longer.levels.levels[0].batches = 1u << 30;
-    EXPECT_FALSE(decode_mesh(longer, kTwoThreads).ok());
+    EXPECT_FALSE(unpack_mesh(longer, kTwoThreads).ok());
 }

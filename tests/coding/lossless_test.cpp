@@ -2,7 +2,7 @@
 // harmless.
 #include "filigree/coding/lossless_corners.h"
 #include "filigree/coding/lossless_numbers.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 
 #include <bit>
 #include <cmath>

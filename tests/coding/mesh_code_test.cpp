@@ -4,9 +4,9 @@
 #include "filigree/coding/mesh_code.h"
 
 #include "coded_size.h"
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/shapes.h"
 #include "io/corpus.h"
 #include "threads.h"
 
@@ -38,20 +38,20 @@ std::map<std::vector<Index>, int> faces_of(const Mesh& mesh, std::span<const Ind
 }
 
 struct Coded {
-    CodedMesh code;
-    MeshCodeReport report;
+    PackedMesh code;
+    PackedMeshReport report;
     Mesh mesh;
 };
 
-Coded coded(const Mesh& mesh, const MeshCodeOptions& options = {}) {
+Coded coded(const Mesh& mesh, const PackOptions& options = {}) {
     Coded result;
-    result.code = encode_mesh(mesh, options, &result.report, kOneThread).value();
-    result.mesh = decode_mesh(result.code, kOneThread).value();
+    result.code = pack_mesh(mesh, options, &result.report, kOneThread).value();
+    result.mesh = unpack_mesh(result.code, kOneThread).value();
     return result;
 }
 
 /// Faces and places, whatever the order.
-void expect_same_surface(const Mesh& mesh, const MeshCodeOptions& options) {
+void expect_same_surface(const Mesh& mesh, const PackOptions& options) {
     const Coded out = coded(mesh, options);
     ASSERT_EQ(out.mesh.vertex_count(), mesh.vertex_count());
     ASSERT_EQ(out.mesh.face_count(), mesh.face_count());
@@ -156,8 +156,8 @@ TEST(MeshCode, Attributes) {
     mesh.materials.names = {"gold", "jade"};
     for (std::size_t f = 0; f < mesh.face_count(); ++f)
         mesh.materials.of_face.push_back(f % 5 ? 0 : f % 3 ? 1 : kNoIndex);
-    for (const MeshCodeOptions& options :
-         {MeshCodeOptions{}, {.keep_order = true}, {.levels = true}, {.keep_order = true, .levels = true}}) {
+    for (const PackOptions& options :
+         {PackOptions{}, {.keep_order = true}, {.levels = true}, {.keep_order = true, .levels = true}}) {
         const bool keep_order = options.keep_order;
         const Coded out = coded(mesh, options);
         float normal_squares = 0;
@@ -239,7 +239,7 @@ TEST(MeshCode, SizesStay) {
         with_colors.colors.emplace_back(0.5f + 0.3f * p.x(), 0.5f + 0.3f * p.y(), p.z() > 0 ? 0.9f : 0.2f, 1.0f);
         with_uvs.uvs.values.emplace_back(0.5f + 0.4f * p.x(), 0.5f + 0.4f * p.y() * p.z());
     }
-    const CodedMesh normals = coded(with_normals).code;
+    const PackedMesh normals = coded(with_normals).code;
     expect_coded_size(normals.connectivity.size(), 6197, "connectivity");
     expect_coded_size(normals.places.size(), 39763, "places");
     expect_coded_size(normals.attributes.size(), 4214, "normals");
@@ -295,13 +295,13 @@ TEST(MeshCode, PointsAndTinyMeshes) {
     Mesh one;
     one.positions.emplace_back(1e9f, -3, 0);
     expect_same_surface(one, {});
-    EXPECT_EQ(encode_mesh(Mesh(), {}, nullptr, kOneThread).error().code, ErrorCode::unsuitable);
-    EXPECT_EQ(encode_mesh(one, {.bits = 9}, nullptr, kOneThread).error().code, ErrorCode::usage);
+    EXPECT_EQ(pack_mesh(Mesh(), {}, nullptr, kOneThread).error().code, ErrorCode::unsuitable);
+    EXPECT_EQ(pack_mesh(one, {.bits = 9}, nullptr, kOneThread).error().code, ErrorCode::usage);
 }
 
 TEST(MeshCode, FewBits) {
     const auto bits = [](const Mesh& mesh, unsigned precision) {
-        const CodedMesh code = coded(mesh, {.bits = precision}).code;
+        const PackedMesh code = coded(mesh, {.bits = precision}).code;
         return std::pair(8.0 * double(code.connectivity.size()) / double(mesh.vertex_count()),
                          8.0 * double(code.places.size()) / double(mesh.vertex_count()));
     };
@@ -318,31 +318,31 @@ TEST(MeshCode, FewBits) {
 }
 
 void expect_damage_named(const Mesh& mesh) {
-    const CodedMesh code = coded(mesh, {.keep_order = true}).code;
-    for (std::string CodedMesh::*part :
-         {&CodedMesh::connectivity, &CodedMesh::places, &CodedMesh::attributes, &CodedMesh::order}) {
+    const PackedMesh code = coded(mesh, {.keep_order = true}).code;
+    for (std::string PackedMesh::*part :
+         {&PackedMesh::connectivity, &PackedMesh::places, &PackedMesh::attributes, &PackedMesh::order}) {
         for (std::size_t at = 0; at < (code.*part).size(); ++at)
             for (const int by : {1, 128, 255}) {
-                CodedMesh damaged = code;
+                PackedMesh damaged = code;
                 (damaged.*part)[at] = char((damaged.*part)[at] ^ by);
-                const Result<Mesh> read = decode_mesh(damaged, kOneThread);
+                const Result<Mesh> read = unpack_mesh(damaged, kOneThread);
                 if (read)
                     ASSERT_EQ(check_mesh(*read), "");
                 else
                     ASSERT_EQ(read.error().code, ErrorCode::bad_file);
             }
         for (std::size_t length = 0; length < (code.*part).size(); length += 3) {
-            CodedMesh cut = code;
+            PackedMesh cut = code;
             (cut.*part).resize(length);
-            EXPECT_FALSE(decode_mesh(cut, kOneThread).ok());
+            EXPECT_FALSE(unpack_mesh(cut, kOneThread).ok());
         }
     }
-    for (std::uint64_t CodedMesh::*count : {&CodedMesh::vertices, &CodedMesh::faces, &CodedMesh::corners})
+    for (std::uint64_t PackedMesh::*count : {&PackedMesh::vertices, &PackedMesh::faces, &PackedMesh::corners})
         for (const std::uint64_t wrong :
              {std::uint64_t{0}, code.*count + 1, std::uint64_t{1} << 31, ~std::uint64_t{0}}) {
-            CodedMesh damaged = code;
+            PackedMesh damaged = code;
             damaged.*count = wrong;
-            EXPECT_FALSE(decode_mesh(damaged, kOneThread).ok());
+            EXPECT_FALSE(unpack_mesh(damaged, kOneThread).ok());
         }
 }
 

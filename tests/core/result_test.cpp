@@ -1,4 +1,4 @@
-#include "filigree/core/result.h"
+#include "filigree/result.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 #include "filigree/core/color.h"
-#include "filigree/core/view.h"
+#include "filigree/types.h"
 
 #include <gtest/gtest.h>
 

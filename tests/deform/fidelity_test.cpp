@@ -1,8 +1,8 @@
-#include "filigree/deform/fidelity.h"
+#include "filigree/pose.h"
 
 #include "filigree/deform/restored_error.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/restore.h"
 #include "hierarchy/part_meshes.h"
 #include "threads.h"
 

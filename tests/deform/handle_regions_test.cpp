@@ -1,8 +1,8 @@
 #include "broken_meshes.h"
-#include "filigree/deform/handle_regions.h"
+#include "filigree/pose.h"
 
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <cmath>

@@ -1,7 +1,6 @@
-#include "filigree/deform/handles.h"
+#include "filigree/pose.h"
 
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 #include "threads.h"
 
 #include <Eigen/Geometry>

@@ -1,10 +1,10 @@
-#include "filigree/hierarchy/pose_error.h"
+#include "filigree/restore.h"
 
 #include "filigree/core/random.h"
 #include "filigree/deform/restored_error.h"
-#include "filigree/deform/space_warp.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/pose.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <algorithm>

@@ -1,8 +1,8 @@
-#include "filigree/deform/pull.h"
+#include "filigree/pose.h"
 
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 #include "filigree/deform/restored_error.h"
 
-#include "filigree/deform/space_warp.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/pose.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
-#include "filigree/deform/space_warp.h"
+#include "filigree/pose.h"
 
+#include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/shapes.h"
 #include "threads.h"
 
 #include <Eigen/Geometry>

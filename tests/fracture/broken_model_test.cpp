@@ -1,10 +1,10 @@
 #include "filigree/fracture.h"
 #include "filigree/fracture/broken_model.h"
 
-#include "filigree/deform/space_warp.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/pose.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <cstring>

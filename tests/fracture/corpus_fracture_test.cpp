@@ -1,6 +1,6 @@
 #include "cases.h"
+#include "filigree/file.h"
 #include "filigree/fracture.h"
-#include "filigree/io/mesh_file.h"
 #include "io/corpus.h"
 
 #include <gtest/gtest.h>

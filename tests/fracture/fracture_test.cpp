@@ -2,11 +2,9 @@
 
 #include "cases.h"
 #include "filigree/core/random.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/shapes.h"
 #include "filigree/mesh/surface.h"
-#include "filigree/mesh/topology.h"
-#include "filigree/mesh/triangulate.h"
 
 #include <cstring>
 #include <gtest/gtest.h>

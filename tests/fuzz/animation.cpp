@@ -3,7 +3,7 @@
 #include "temporary.h"
 
 #include "filigree/io/point_cache.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 
 #include <algorithm>
 

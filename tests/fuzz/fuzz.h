@@ -2,8 +2,8 @@
 // scripts/fuzz; replay.cpp for scripts/test.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 
 #include <cstdint>
 #include <cstdio>

@@ -2,7 +2,7 @@
 #include "fuzz.h"
 
 #include "filigree/melting/field_surface.h"
-#include "filigree/mesh/topology.h"
+#include "filigree/mesh.h"
 
 using namespace filigree_fuzz;
 

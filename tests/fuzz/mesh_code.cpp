@@ -3,7 +3,7 @@
 #include "fuzz.h"
 
 #include "filigree/coding/mesh_code.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 
 using namespace filigree_fuzz;
 
@@ -46,11 +46,11 @@ void add_values(CornerAttribute<T>& attribute, const Mesh& mesh, Bytes& bytes, b
 }
 
 /// Changes a byte of one of its streams, and reads what became of it.
-void damage(const CodedMesh& coded, std::string& stream, Bytes& bytes) {
+void damage(const PackedMesh& coded, std::string& stream, Bytes& bytes) {
     if (stream.empty() || bytes.empty()) return;
     const std::size_t at = (bytes.byte() * 256 + bytes.byte()) % stream.size();
     stream[at] = char(stream[at] ^ bytes.byte());
-    const Result<Mesh> damaged = decode_mesh(coded, kContext);
+    const Result<Mesh> damaged = unpack_mesh(coded, kContext);
     if (is_sound(damaged)) require(check_mesh(*damaged).empty(), "a damaged code gives a sound mesh or none");
 }
 
@@ -67,10 +67,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
             for (Vec3f& n : mesh.normals.values) n = n.norm() > 0 ? n.normalized() : Vec3f(0, 0, 1);
     }
     const float uv_step = mesh.uvs.empty() ? 0 : 16.0f / 4095;
-    const MeshCodeOptions how{10 + options % 7, (options & 64) != 0, (options & 128) != 0, (options & 32) != 0};
-    MeshCodeReport report;
-    CodedMesh coded = encode_mesh(mesh, how, &report, kContext).value();
-    const Mesh read = decode_mesh(coded, kContext).value();
+    const PackOptions how{10 + options % 7, (options & 64) != 0, (options & 128) != 0, (options & 32) != 0};
+    PackedMeshReport report;
+    PackedMesh coded = pack_mesh(mesh, how, &report, kContext).value();
+    const Mesh read = unpack_mesh(coded, kContext).value();
     require(read.vertex_count() == mesh.vertex_count() && read.face_count() == mesh.face_count(), "nothing is lost");
     require(!how.keep_order || read.corners == mesh.corners, "faces come back in their order");
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
@@ -85,12 +85,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
             require((read.uvs.values[is] - mesh.uvs.values[was]).cwiseAbs().maxCoeff() <= uv_step,
                     "texture coordinates are near");
     }
-    for (std::string CodedMesh::*part :
-         {&CodedMesh::connectivity, &CodedMesh::places, &CodedMesh::attributes, &CodedMesh::order})
+    for (std::string PackedMesh::*part :
+         {&PackedMesh::connectivity, &PackedMesh::places, &PackedMesh::attributes, &PackedMesh::order})
         damage(coded, coded.*part, bytes);
     damage(coded, coded.levels.connectivity, bytes);
     damage(coded, coded.levels.places, bytes);
-    for (CodedLevel& level : coded.levels.levels) {
+    for (PackedLevel& level : coded.levels.levels) {
         damage(coded, level.splits, bytes);
         damage(coded, level.refinement, bytes);
     }

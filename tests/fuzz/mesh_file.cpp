@@ -1,8 +1,8 @@
 // Readers of meshes: whatever the bytes, a sound mesh or a sentence; what was read is written and read again the same.
 #include "fuzz.h"
 
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 
 using namespace filigree_fuzz;
 

@@ -2,13 +2,14 @@
 // say. Checksums are mended first, or no change would get past them.
 #include "fuzz.h"
 
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
+#include "filigree/io/file.h"
 #include "filigree/io/model_chunks.h"
 #include "filigree/io/model_file.h"
 #include "filigree/io/model_sections.h"
 #include "filigree/io/reference_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 
 #include <filesystem>
 
@@ -41,11 +42,11 @@ std::string with_sums(std::string file) {
     return file;
 }
 
-std::string coded_file(const Model& model, const MeshCodeOptions& options) {
+std::string coded_file(const Model& model, const PackOptions& options) {
     const std::filesystem::path path =
         std::filesystem::temp_directory_path() / ("fuzz-" + std::to_string(::getpid()) + ".fil");
     std::string bytes;
-    if (write_coded_model(model, {}, options, path, kContext)) {
+    if (pack_model(model, {}, options, path, kContext)) {
         const Result<FileReader> file = FileReader::open(path);
         bytes = file->read_all().value();
     }
@@ -57,7 +58,7 @@ std::string lossless_file(const Model& model, const PoseSequence& poses) {
     const std::filesystem::path path =
         std::filesystem::temp_directory_path() / ("fuzz-" + std::to_string(::getpid()) + ".fil");
     std::string bytes;
-    if (write_lossless_model(model, poses, path, kContext)) bytes = FileReader::open(path)->read_all().value();
+    if (pack_model_lossless(model, poses, path, kContext)) bytes = FileReader::open(path)->read_all().value();
     std::filesystem::remove(path);
     return bytes;
 }

@@ -1,7 +1,7 @@
 // Quads from any mesh: they are quads of a regular grid and sound, or a sentence says why there are none.
 #include "fuzz.h"
 
-#include "filigree/remesh/quad_remesh.h"
+#include "filigree/remesh.h"
 
 using namespace filigree_fuzz;
 

@@ -2,8 +2,8 @@
 // threads the same bytes as one.
 #include "fuzz.h"
 
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 
 #include <cmath>
 

@@ -1,10 +1,9 @@
 #include "filigree/hierarchy/bind.h"
 
 #include "filigree/hierarchy/simplify.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
 #include "hierarchy/part_meshes.h"
 #include "threads.h"
 

@@ -1,7 +1,7 @@
 // Public calls of the layer look at the meshes they are given.
 #include "broken_meshes.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

@@ -1,12 +1,9 @@
 // Levels made in clusters: as many vertices as asked, no seams, nothing torn, and the same for any number of threads.
 #include "filigree/hierarchy/cluster_simplify.h"
 
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/mesh_distance.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/topology.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <algorithm>

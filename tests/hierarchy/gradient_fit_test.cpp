@@ -1,8 +1,8 @@
 #include "filigree/hierarchy/gradient_fit.h"
 
 #include "filigree/core/random.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/shapes.h"
 #include "stripping.h"
 #include "threads.h"
 

@@ -1,8 +1,7 @@
 // check_model sees every way a model can be wrong.
-#include "filigree/hierarchy/model.h"
+#include "filigree/strip.h"
 
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 #include "hierarchy/stripping.h"
 
 using namespace filigree_test;

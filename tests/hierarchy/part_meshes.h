@@ -1,7 +1,7 @@
 // Meshes of several parts: what lies on a surface, and what lies beside a detailed one.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 #include <cmath>
 #include <numbers>

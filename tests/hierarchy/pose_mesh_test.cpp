@@ -1,7 +1,7 @@
 // A driver as others move it: what is written of a pose is read back.
 #include "filigree/hierarchy/pose_mesh.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "hierarchy/stripping.h"
 
 using namespace filigree_test;

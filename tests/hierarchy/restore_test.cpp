@@ -1,9 +1,10 @@
 // Restoring from a moved driver: exact where it must be, as close to the full deformation as design and prototype say.
-#include "filigree/hierarchy/restore.h"
+#include "filigree/hierarchy/blend_code.h"
+#include "filigree/restore.h"
 
-#include "filigree/deform/space_warp.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/pose.h"
 #include "hierarchy/stripping.h"
 #include "threads.h"
 

@@ -2,10 +2,7 @@
 #include "cases.h"
 #include "filigree/hierarchy/simplify.h"
 
-#include "filigree/mesh/mesh_distance.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/topology.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 #include "hierarchy/part_meshes.h"
 #include "threads.h"
 

@@ -1,10 +1,9 @@
 // The blend code as a skin: what another program computes from joints is what we restore.
-#include "filigree/hierarchy/skin.h"
+#include "filigree/restore.h"
 
-#include "filigree/deform/space_warp.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/pose.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

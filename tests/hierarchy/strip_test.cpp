@@ -1,9 +1,8 @@
 // Stripping any mesh: the driver is a subset, the levels are nested, and at rest everything comes back.
-#include "filigree/hierarchy/strip.h"
+#include "filigree/strip.h"
 
 #include "filigree/hierarchy/vertex_order.h"
-#include "filigree/mesh/mesh_distance.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "hierarchy/stripping.h"
 #include "threads.h"
 

@@ -1,9 +1,8 @@
 // Drivers of somebody else's: they need not share a vertex with the mesh.
-#include "filigree/deform/space_warp.h"
-#include "filigree/hierarchy/pose_error.h"
-#include "filigree/hierarchy/skin.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/pose.h"
+#include "filigree/restore.h"
 #include "hierarchy/stripping.h"
 #include "threads.h"
 

@@ -1,8 +1,8 @@
 // What the tests of strip and restore share.
 #pragma once
 
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // Public calls of the layer look at the meshes they are given, and stop where they are told to.
 #include "broken_meshes.h"
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

@@ -1,9 +1,9 @@
 // Models packed in few bits and read again.
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
 #include "filigree/io/file.h"
 #include "filigree/io/model_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>
@@ -29,13 +29,13 @@ Pose squeezed(const Model& model) {
     return pose;
 }
 
-TEST(CodedModel, ADriverMadeElsewhereComesBack) {
+TEST(PackedModel, ADriverMadeElsewhereComesBack) {
     const Model model = bound_elsewhere();
     const std::filesystem::path path = packed_path();
     for (const bool keep_order : {false, true}) {
         const PoseSequence poses{24, {squeezed(model), rest_pose(model)}};
-        const Result<CodingReport> report =
-            write_coded_model(model, poses, {.bits = 14, .keep_order = keep_order}, path, kTwoThreads);
+        const Result<PackReport> report =
+            pack_model(model, poses, {.bits = 14, .keep_order = keep_order}, path, kTwoThreads);
         ASSERT_TRUE(report.ok()) << report.error().message;
         EXPECT_LT(std::filesystem::file_size(path), sizeof(Vec3f) * model.mesh.vertex_count() / 2);
         const ModelOutline outline = read_model_outline(FileReader::open(path).value(), "packed", kTwoThreads).value();
@@ -61,9 +61,9 @@ TEST(CodedModel, ADriverMadeElsewhereComesBack) {
     std::filesystem::remove(path);
 }
 
-TEST(CodedModel, AStreamOfADriverMadeElsewhereIsRefused) {
+TEST(PackedModel, AStreamOfADriverMadeElsewhereIsRefused) {
     const std::filesystem::path path = packed_path();
-    const Result<CodingReport> report = write_coded_model(bound_elsewhere(), {}, {.levels = true}, path, kTwoThreads);
+    const Result<PackReport> report = pack_model(bound_elsewhere(), {}, {.levels = true}, path, kTwoThreads);
     ASSERT_FALSE(report.ok());
     EXPECT_EQ(report.error().code, ErrorCode::unsuitable);
     EXPECT_FALSE(std::filesystem::exists(path));

@@ -1,7 +1,7 @@
 #include "io/corpus.h"
 
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/topology.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 #include "io/welded.h"
 
 #include <gtest/gtest.h>

@@ -1,8 +1,8 @@
 // The topology report against the counts that the corpus manifest gives for real and damaged meshes.
 #include "io/corpus.h"
 
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/topology.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 #include "io/welded.h"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // Key frames of a mesh whose faces change, as plain glTF.
 #include "filigree/io/file.h"
 #include "filigree/io/point_cache.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "threads.h"
 
 #include <cstring>

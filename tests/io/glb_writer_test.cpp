@@ -1,5 +1,5 @@
 // What a GLB of a mesh that stands still holds, looked at with nothing of ours but the JSON parser.
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "sample_meshes.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Attributes as careless exporters write them, UVs that a material moves, and extensions that a file requires.
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "io/gltf_text.h"
 
 #include <gtest/gtest.h>

@@ -1,13 +1,13 @@
 // Models that leave as GLB: what the file plays is what we restore, and its parts are laid out as docs/exchange.md
 // says.
-#include "filigree/io/gltf_export.h"
+#include "filigree/file.h"
 
-#include "filigree/deform/space_warp.h"
-#include "filigree/hierarchy/strip.h"
 #include "filigree/io/file.h"
 #include "filigree/io/gltf.h"
 #include "filigree/io/point_cache.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/pose.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <cstring>

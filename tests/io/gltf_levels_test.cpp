@@ -1,7 +1,7 @@
-#include "filigree/hierarchy/strip.h"
+#include "filigree/file.h"
 #include "filigree/io/file.h"
-#include "filigree/io/gltf_export.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/strip.h"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>

@@ -1,8 +1,8 @@
 // glTF that is wrong, hostile, or asks for what we do not have: refused with a sentence, and nothing read from
 // elsewhere.
+#include "filigree/file.h"
 #include "filigree/io/file.h"
 #include "filigree/io/gltf.h"
-#include "filigree/io/mesh_file.h"
 #include "io/gltf_text.h"
 
 #include <gtest/gtest.h>

@@ -1,8 +1,8 @@
 // Reading glTF: nodes, primitives, attributes, materials, and our own files again.
+#include "filigree/file.h"
 #include "filigree/io/file.h"
 #include "filigree/io/gltf.h"
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "io/corpus.h"
 #include "io/gltf_text.h"
 #include "io/sample_meshes.h"

@@ -1,7 +1,7 @@
 // Small glTF files put together by hand: numbers become accessors over one buffer, everything else is JSON.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <gtest/gtest.h>
 

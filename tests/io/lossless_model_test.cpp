@@ -4,14 +4,15 @@
 #include "sample_meshes.h"
 #include "threads.h"
 
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
+#include "filigree/io/file.h"
 #include "filigree/io/model_chunks.h"
 #include "filigree/io/model_file.h"
 #include "filigree/io/model_sections.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 
 #include <cstdlib>
 #include <gtest/gtest.h>
@@ -34,7 +35,7 @@ PoseSequence bending(const Model& model, std::size_t frames, bool with_gradients
 std::string lossless_file(const Model& model, const PoseSequence& poses, std::uint64_t* plain = nullptr) {
     std::string name = (std::filesystem::temp_directory_path() / "filigree-lossless-XXXXXX").string();
     const std::filesystem::path folder = ::mkdtemp(name.data()), path = folder / "it.fil";
-    const LosslessReport report = write_lossless_model(model, poses, path, kTwoThreads).value();
+    const LosslessPackReport report = pack_model_lossless(model, poses, path, kTwoThreads).value();
     if (plain) *plain = report.plain;
     std::string bytes = read_file(path).value();
     std::filesystem::remove_all(folder);

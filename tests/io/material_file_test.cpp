@@ -1,5 +1,5 @@
+#include "filigree/file.h"
 #include "filigree/io/material_file.h"
-#include "filigree/io/mesh_file.h"
 
 #include <gtest/gtest.h>
 

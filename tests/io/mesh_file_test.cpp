@@ -1,5 +1,5 @@
+#include "filigree/file.h"
 #include "filigree/io/file.h"
-#include "filigree/io/mesh_file.h"
 #include "io/sample_meshes.h"
 #include "threads.h"
 

@@ -1,6 +1,6 @@
 // Damaged files: whatever happens to the bytes, reading ends soon, with a right mesh or with a sentence.
+#include "filigree/file.h"
 #include "filigree/io/file.h"
-#include "filigree/io/mesh_file.h"
 #include "io/corpus.h"
 #include "io/sample_meshes.h"
 

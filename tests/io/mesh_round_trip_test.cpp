@@ -1,9 +1,9 @@
 // Any mesh, with any attributes that a format holds, written and read back; and every pair of formats in a row.
 #include "corpus.h"
-#include "filigree/hierarchy/strip.h"
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "filigree/io/model_file.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
+#include "filigree/strip.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

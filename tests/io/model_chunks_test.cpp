@@ -1,10 +1,11 @@
 // Models that stay in their files: chunk by chunk the same bytes as the whole.
+#include "filigree/io/file.h"
 #include "filigree/io/model_chunks.h"
 
-#include "filigree/hierarchy/strip.h"
 #include "filigree/io/model_file.h"
 #include "filigree/io/reference_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

@@ -1,12 +1,12 @@
 // Model files: they come back as they were, and whatever happens to their bytes ends in a sound model or a sentence.
 #include "filigree/io/model_file.h"
 
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
 #include "filigree/io/file.h"
 #include "filigree/io/model_sections.h"
 #include "filigree/io/reference_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 #include "io/sample_meshes.h"
 #include "threads.h"
 
@@ -620,7 +620,7 @@ TEST(ModelFile, PackedPartsThatWouldComeToAnySizeAreRefused) {
         EXPECT_EQ(as_model.error().code, ErrorCode::bad_file);
         EXPECT_NE(as_model.error().message.find(words), std::string::npos) << as_model.error().message;
     };
-    ASSERT_TRUE(write_coded_model(model, poses, {}, path, RunContext()).ok());
+    ASSERT_TRUE(pack_model(model, poses, {}, path, RunContext()).ok());
     const std::string coded = FileReader::open(path)->read_all().value();
     Patcher frames(coded); // 4,294,967,295 poses
     frames.set<std::uint32_t>("cd.pose", 0, ~0u);
@@ -629,7 +629,7 @@ TEST(ModelFile, PackedPartsThatWouldComeToAnySizeAreRefused) {
     vertices.set<std::uint64_t>("cd.par", 0, 1'000'000'000);
     refused(vertices.bytes(), true);
 
-    ASSERT_TRUE(write_lossless_model(model, poses, path, RunContext()).ok());
+    ASSERT_TRUE(pack_model_lossless(model, poses, path, RunContext()).ok());
     Patcher sections(FileReader::open(path)->read_all().value());
     TestSection plain = sections.get<TestSection>("ll.tab", 0);
     plain.count = std::uint64_t{1} << 40;

@@ -1,8 +1,8 @@
 // Poses in model files: they come back to the bit, other programs' readers pass over them, and damage is refused.
 #include "filigree/io/model_file.h"
 
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

@@ -1,8 +1,10 @@
 // Streams: the mesh gets better with every byte, however the bytes come; the whole file is a model with its poses.
-#include "filigree/io/model_stream.h"
+#include "filigree/io/file.h"
+#include "filigree/io/model_file.h"
+#include "filigree/pack.h"
 
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <algorithm>
@@ -34,7 +36,7 @@ PoseSequence turning(const Model& model, std::size_t frames) {
 std::string frames_of(const Model& model, const PoseSequence& poses) {
     std::string name = (std::filesystem::temp_directory_path() / "filigree-stream-XXXXXX").string();
     const std::filesystem::path folder = ::mkdtemp(name.data()), path = folder / "stream.fil";
-    write_coded_model(model, poses, {.levels = true}, path, kTwoThreads).value();
+    pack_model(model, poses, {.levels = true}, path, kTwoThreads).value();
     std::string bytes = read_file(path).value();
     std::filesystem::remove_all(folder);
     return bytes;
@@ -46,7 +48,7 @@ TEST(ModelStream, BetterWithEveryLevel) {
     const Model model = wavy_model();
     const std::string bytes = frames_of(model, {});
     const ModelOutline outline = read_model_outline(FileReader(bytes), "it", kTwoThreads).value();
-    const std::vector<CodedLevelMark>& marks = outline.coding->levels;
+    const std::vector<PackedLevelMark>& marks = outline.coding->levels;
     ASSERT_GE(marks.size(), 4u);
     EXPECT_LT(marks[0].bytes, bytes.size() / 4);
     for (const std::size_t piece : {std::size_t{1}, std::size_t{97}, bytes.size()}) {

@@ -1,4 +1,4 @@
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 
 #include <gtest/gtest.h>
 

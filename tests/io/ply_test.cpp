@@ -1,5 +1,5 @@
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 
 #include <gtest/gtest.h>
 

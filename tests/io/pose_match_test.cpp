@@ -1,9 +1,9 @@
 #include "filigree/io/pose_match.h"
 
+#include "filigree/file.h"
 #include "filigree/io/file.h"
-#include "filigree/io/mesh_file.h"
 #include "filigree/io/point_cache.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "io/gltf_text.h"
 #include "threads.h"
 

@@ -1,7 +1,7 @@
 // Small meshes that carry everything a Mesh can carry.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 namespace filigree_test {
 

@@ -1,7 +1,7 @@
 // USD text, read back by a reader that knows only the grammar of what is asked for.
 #include "filigree/io/file.h"
 #include "filigree/io/point_cache.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "threads.h"
 
 #include <cstdlib>

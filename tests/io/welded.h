@@ -1,7 +1,7 @@
 // Vertices at one place made one, as other programs count them: glTF keeps corners with other normals or UVs apart.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/weld.h"
 
 namespace filigree_test {

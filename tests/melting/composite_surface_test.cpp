@@ -3,8 +3,7 @@
 #include "matter.h"
 
 #include "filigree/melting/composite_surface.h"
-#include "filigree/mesh/mesh_distance.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 
 #include <cmath>
 

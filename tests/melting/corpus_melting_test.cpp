@@ -1,7 +1,7 @@
 // Every closed good mesh of the corpus, molten in places: closed, manifold and oriented.
 #include "matter.h"
 
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "filigree/melting/composite_surface.h"
 #include "filigree/physics/body.h"
 #include "io/corpus.h"

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/core/random.h"
-#include "filigree/mesh/topology.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/simulation.h"
 
 #include <gtest/gtest.h>

@@ -1,13 +1,10 @@
 // Public calls of the layer look at the meshes they are given.
 #include "broken_meshes.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/edges.h"
-#include "filigree/mesh/mesh_distance.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/regular_patches.h"
 #include "filigree/mesh/surface.h"
 #include "filigree/mesh/surfels.h"
-#include "filigree/mesh/topology.h"
-#include "filigree/mesh/triangulate.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,6 @@
 #include "filigree/mesh/closest_point.h"
 
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 #include "sanitized.h"
 
 #include <Eigen/Geometry>

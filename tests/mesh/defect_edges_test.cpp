@@ -1,7 +1,6 @@
 #include "filigree/mesh/defect_edges.h"
 
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/topology.h"
+#include "filigree/mesh.h"
 
 #include <algorithm>
 #include <array>

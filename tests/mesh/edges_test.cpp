@@ -1,6 +1,7 @@
 #include "filigree/mesh/edges.h"
+#include "filigree/remesh/manifold_surface.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "remesh/manifold_check.h"
 
 namespace filigree_test {

@@ -1,9 +1,7 @@
+#include "filigree/mesh.h"
 #include "filigree/mesh/measured_surface.h"
-#include "filigree/mesh/mesh_distance.h"
 
 #include "filigree/mesh/closest_point.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
 #include "threads.h"
 
 #include <algorithm>

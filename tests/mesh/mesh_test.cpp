@@ -1,4 +1,4 @@
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 #include <gtest/gtest.h>
 

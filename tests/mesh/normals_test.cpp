@@ -1,7 +1,6 @@
 #include "filigree/mesh/normals.h"
 
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

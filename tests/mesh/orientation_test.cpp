@@ -1,6 +1,6 @@
 #include "filigree/mesh/orientation.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/surface.h"
 #include "threads.h"
 

@@ -1,7 +1,6 @@
 #include "filigree/mesh/ray_hit.h"
 
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/vertex_cache.h"
 #include "threads.h"
 

@@ -1,6 +1,5 @@
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/regular_patches.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 
 #include <algorithm>
 #include <cstdlib>

@@ -1,6 +1,4 @@
-#include "filigree/mesh/shapes.h"
-
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

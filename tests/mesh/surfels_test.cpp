@@ -1,8 +1,7 @@
 #include "filigree/mesh/surfels.h"
 
+#include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

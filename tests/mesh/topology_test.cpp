@@ -1,6 +1,5 @@
-#include "filigree/mesh/topology.h"
+#include "filigree/mesh.h"
 
-#include "filigree/mesh/shapes.h"
 #include "threads.h"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 
 #include <Eigen/Geometry>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "filigree/mesh/up_axis.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 
 #include <gtest/gtest.h>
 

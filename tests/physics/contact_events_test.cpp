@@ -1,5 +1,5 @@
 // What touches in a frame, and what a ray meets.
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "physics/simulation_scenes.h"
 #include "physics/test_bodies.h"
 #include "threads.h"

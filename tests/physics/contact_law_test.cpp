@@ -1,5 +1,5 @@
 // Friction, restitution and energy of elastic bodies that touch obstacles and each other.
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/material.h"
 #include "physics/test_bodies.h"
 #include "simulation_scenes.h"

@@ -1,9 +1,9 @@
 #include "filigree/physics/body.h"
 
 #include "filigree/core/random.h"
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/closest_point.h"
-#include "filigree/mesh/shapes.h"
 #include "filigree/sample.h"
 #include "filigree/sample/closure.h"
 #include "io/corpus.h"

@@ -1,8 +1,8 @@
 // Bodies that break: what holds pieces, when it lets go, and what is kept.
 #include "filigree/core/random.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/physics/breaking/broken_body.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/body/elasticity.h"
+#include "filigree/physics/breaking/broken_body.h"
 #include "filigree/physics/simulation.h"
 #include "test_bodies.h"
 #include "threads.h"
@@ -37,8 +37,7 @@ Material brittle() { return undamped(0.2); }
 std::shared_ptr<Fracture> fracture_of(std::shared_ptr<const Body> whole, Partition partition, double strength,
                                       double energy) {
     auto fracture = std::make_shared<Fracture>();
-    fracture->body =
-        break_body(std::move(whole), std::move(partition), kTwoThreads).value();
+    fracture->body = break_body(std::move(whole), std::move(partition), kTwoThreads).value();
     fracture->material.strength = strength;
     fracture->material.energy = energy;
     return fracture;

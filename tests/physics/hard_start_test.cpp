@@ -2,7 +2,7 @@
 #include "filigree/physics/simulation.h"
 
 #include "filigree/core/random.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "physics/simulation_scenes.h"
 #include "physics/test_bodies.h"
 

@@ -1,5 +1,5 @@
 // Parts of a mesh that have a gap between them, and whether a body says that it joins them.
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/body.h"
 #include "threads.h"
 

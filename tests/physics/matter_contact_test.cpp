@@ -1,8 +1,8 @@
 // Bodies that touch each other and themselves.
 
 #include "filigree/core/random.h"
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/contact/cell_boxes.h"
 #include "filigree/physics/rigid/rigid_body.h"
 #include "io/corpus.h"

@@ -1,7 +1,7 @@
 // Finding where points lie in a body's matter, and which cells are near.
 
 #include "filigree/core/random.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/contact/cell_boxes.h"
 #include "filigree/physics/contact/own_cells.h"

@@ -1,6 +1,6 @@
 // Meshfree bodies touch as others do: by points of their surface, in cells whose corners their particles carry.
 #include "filigree/core/random.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/body/body_state.h"
 #include "filigree/physics/body/make_cells.h"
 #include "physics/test_bodies.h"

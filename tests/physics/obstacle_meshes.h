@@ -1,7 +1,7 @@
 // Meshes that bodies meet: sheets, terrain, rooms, boxes.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 #include <algorithm>
 #include <array>

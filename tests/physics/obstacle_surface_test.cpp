@@ -1,6 +1,6 @@
 // Triangles as walls with two sides: what is closest, what a way meets, and where points are held.
 #include "filigree/core/random.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/contact/obstacle_trace.h"
 #include "obstacle_meshes.h"
 #include "threads.h"

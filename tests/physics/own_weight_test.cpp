@@ -1,6 +1,6 @@
 #include "filigree/physics/body/own_weight.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/material.h"
 #include "filigree/physics/simulation.h"

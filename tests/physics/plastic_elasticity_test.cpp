@@ -1,6 +1,6 @@
 // fem that yields: its formulas, and what it keeps.
 #include "elastic_checks.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/fem/plastic_cells.h"
 #include "test_bodies.h"

@@ -1,7 +1,7 @@
 // Rigid bodies that hit, stack and carry: restitution, mass ratios and stacks are what was asked.
 #include "../../bench/heap.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/rigid/contact_manifold.h"
 #include "filigree/physics/simulation.h"
 #include "simulation_scenes.h"

@@ -1,7 +1,7 @@
 #include "filigree/physics/simulation.h"
 
 #include "filigree/core/random.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/material.h"
 #include "physics/simulation_scenes.h"

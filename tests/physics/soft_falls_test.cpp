@@ -1,7 +1,7 @@
 // Soft presets fall from 1.5 times their own height, and keep their cells the right way round. All presets, sizes and
 // scans: bench/soft_falls.cpp.
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/material.h"
 #include "filigree/physics/simulation.h"
 #include "io/corpus.h"

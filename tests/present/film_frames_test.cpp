@@ -1,7 +1,7 @@
 #include "filigree/present/film_frames.h"
 
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

@@ -1,8 +1,8 @@
 #include "filigree/present/model_film.h"
 
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/render.h"
+#include "filigree/strip.h"
 
 #include <filesystem>
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 #include "filigree/present/patch_colors.h"
 #include "filigree/render.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/present/patch_drawing.h"
 #include "threads.h"
 

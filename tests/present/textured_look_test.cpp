@@ -2,9 +2,8 @@
 #include "filigree/present/textured_look.h"
 
 #include "filigree/core/srgb.h"
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/topology.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 #include "filigree/render.h"
 #include "filigree/scene/melting_surface.h"
 #include "filigree/scene/scene_run.h"

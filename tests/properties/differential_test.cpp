@@ -2,14 +2,13 @@
 // rapidcheck prints the seed of a failure; scripts/properties tries many more.
 #include "filigree/coding/mesh_code.h"
 #include "filigree/fracture.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
 #include "filigree/io/file.h"
 #include "filigree/io/model_file.h"
-#include "filigree/mesh/mesh_distance.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/simulation.h"
+#include "filigree/restore.h"
 #include "filigree/sample.h"
+#include "filigree/strip.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>
@@ -158,14 +157,14 @@ RC_GTEST_PROP(Differential, ScanRaysAndWindingFindTheSamePoints, ()) {
 
 RC_GTEST_PROP(Differential, ACodedMeshIsThePlainOneWithinItsStep, ()) {
     const Mesh mesh = any_surface();
-    const MeshCodeOptions options{
+    const PackOptions options{
         .bits = *gen::inRange(10u, 17u), .keep_order = *gen::arbitrary<bool>(), .levels = *gen::arbitrary<bool>()};
-    MeshCodeReport report;
-    const auto coded = encode_mesh(mesh, options, &report, kOneThread),
-               again = encode_mesh(mesh, options, nullptr, kTwoThreads);
+    PackedMeshReport report;
+    const auto coded = pack_mesh(mesh, options, &report, kOneThread),
+               again = pack_mesh(mesh, options, nullptr, kTwoThreads);
     RC_ASSERT(coded.ok() && again.ok());
     RC_ASSERT(coded->places == again->places && coded->connectivity == again->connectivity);
-    const auto read = decode_mesh(*coded, kOneThread);
+    const auto read = unpack_mesh(*coded, kOneThread);
     RC_ASSERT(read.ok());
     if (options.keep_order) RC_ASSERT(read->corners == mesh.corners);
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {

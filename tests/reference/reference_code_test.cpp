@@ -1,5 +1,6 @@
 #include "cases.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/reference/height_law.h"
 #include "filigree/reference/reference_code.h"
 #include "hierarchy/stripping.h"
 #include "threads.h"

@@ -1,9 +1,9 @@
 // A mesh stripped by the report's method as a model: its levels, its restoring, what is refused.
-#include "filigree/reference/reference_model.h"
+#include "filigree/reference.h"
 
 #include "broken_meshes.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/shapes.h"
 #include "hierarchy/stripping.h"
 
 namespace {

@@ -1,7 +1,7 @@
 // Public calls of the layer look at the meshes they are given.
 #include "broken_meshes.h"
+#include "filigree/remesh.h"
 #include "filigree/remesh/manifold_surface.h"
-#include "filigree/remesh/quad_remesh.h"
 #include "filigree/remesh/transfer_attributes.h"
 #include "threads.h"
 

@@ -1,6 +1,6 @@
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/edges.h"
-#include "filigree/mesh/shapes.h"
 #include "filigree/remesh/manifold_surface.h"
 #include "remesh/manifold_check.h"
 #include "threads.h"

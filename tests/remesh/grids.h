@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/remesh/base_triangles.h"
+#include "filigree/remesh/manifold_surface.h"
 #include "prepared.h"
 #include "threads.h"
 

@@ -1,7 +1,7 @@
 // What every manifold surface must be, found with plain maps, and voxel bodies to try it on.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 #include "filigree/remesh/manifold_surface.h"
 
 #include <Eigen/Geometry>

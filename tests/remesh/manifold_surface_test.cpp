@@ -1,7 +1,7 @@
 #include "filigree/remesh/manifold_surface.h"
 
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 #include "io/corpus.h"
 #include "remesh/manifold_check.h"
 #include "threads.h"

@@ -1,6 +1,6 @@
 #include "filigree/remesh/patch_grid.h"
 
-#include "filigree/mesh/topology.h"
+#include "filigree/mesh.h"
 #include "filigree/remesh/base_triangles.h"
 #include "grids.h"
 

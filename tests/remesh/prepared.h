@@ -1,10 +1,11 @@
 // Surfaces ready to be remeshed, and what every map and grid over them must be.
 #pragma once
 
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/edges.h"
-#include "filigree/mesh/shapes.h"
 #include "filigree/remesh/feature_curves.h"
+#include "filigree/remesh/manifold_surface.h"
 #include "filigree/remesh/patch_grid.h"
 #include "io/corpus.h"
 #include "threads.h"

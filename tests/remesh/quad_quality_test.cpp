@@ -1,6 +1,6 @@
 #include "filigree/remesh/quad_quality.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "threads.h"
 
 #include <algorithm>

@@ -1,9 +1,9 @@
 #include "cases.h"
-#include "filigree/remesh/quad_remesh.h"
+#include "filigree/remesh.h"
+#include "filigree/remesh/manifold_surface.h"
 
-#include "filigree/mesh/mesh_distance.h"
-#include "filigree/mesh/topology.h"
-#include "filigree/reference/reference_model.h"
+#include "filigree/mesh.h"
+#include "filigree/reference.h"
 #include "grids.h"
 #include "hierarchy/stripping.h"
 #include "manifold_check.h"

@@ -1,3 +1,4 @@
+#include "filigree/remesh/manifold_surface.h"
 #include "filigree/remesh/tips.h"
 
 #include "filigree/remesh/relax.h"

@@ -1,9 +1,8 @@
 #include "filigree/remesh/transfer_attributes.h"
 
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/closest_point.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
 #include "io/corpus.h"
 #include "threads.h"
 

@@ -1,10 +1,8 @@
+#include "filigree/remesh/manifold_surface.h"
 #include "filigree/remesh/voxel_wrap.h"
 
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/mesh_distance.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/topology.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 #include "io/corpus.h"
 #include "threads.h"
 

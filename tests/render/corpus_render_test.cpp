@@ -1,6 +1,6 @@
 // Every mesh of the corpus that can be read can be drawn.
 #include "cases.h"
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "filigree/render.h"
 #include "io/corpus.h"
 

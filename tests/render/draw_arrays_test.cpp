@@ -1,7 +1,7 @@
 // Meshes as the GPU draws them: what is shared, what is split, and which sides are edges.
 #include "filigree/render/draw_arrays.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "threads.h"
 
 #include <algorithm>

@@ -1,10 +1,10 @@
 // Restoring in the vertex shader gives what the CPU gives.
 #include "filigree/render/gpu_restore.h"
 
-#include "filigree/deform/space_warp.h"
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/pose.h"
 #include "filigree/render.h"
 #include "hierarchy/stripping.h"
 #include "io/corpus.h"

@@ -1,8 +1,8 @@
 // The box of a posed model: never smaller than what it holds, and not much larger.
 #include "filigree/render/pose_box.h"
 
-#include "filigree/deform/space_warp.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/pose.h"
 #include "hierarchy/stripping.h"
 
 #include <numbers>

@@ -1,7 +1,7 @@
 // What tests of pictures share: a renderer without a window, and scenes.
 #pragma once
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/render.h"
 #include "hierarchy/stripping.h"
 

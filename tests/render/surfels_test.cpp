@@ -1,6 +1,7 @@
 // What surfels cover of a surface, as seen from four sides.
-#include "filigree/deform/space_warp.h"
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
+#include "filigree/hierarchy/blend_code.h"
+#include "filigree/pose.h"
 #include "render/rendered.h"
 #include "render/surfel_coverage.h"
 

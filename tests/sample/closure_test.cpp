@@ -1,6 +1,6 @@
 #include "filigree/sample/closure.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 #include "filigree/sample/frustum.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/sample.h"
 #include "sample/bodies.h"
 

@@ -1,5 +1,5 @@
 // Every mesh of the corpus that can be read, good and bad, gets points or a sentence.
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "filigree/sample.h"
 #include "io/corpus.h"
 

@@ -1,7 +1,6 @@
 #include "filigree/sample/inside_rays.h"
 
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 
 #include <gtest/gtest.h>
 

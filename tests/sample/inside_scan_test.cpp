@@ -1,9 +1,8 @@
 #include "cases.h"
 #include "filigree/sample/inside_scan.h"
 
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/weld.h"
 #include "io/corpus.h"
 #include "threads.h"

@@ -2,7 +2,7 @@
 #include "filigree/sample/closure.h"
 
 #include "bodies.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 
 #include <gtest/gtest.h>
 

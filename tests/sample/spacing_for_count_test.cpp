@@ -1,6 +1,6 @@
 #include "filigree/sample.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "sample/bodies.h"
 
 #include <gtest/gtest.h>

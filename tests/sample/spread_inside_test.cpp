@@ -1,7 +1,7 @@
 #include "filigree/sample.h"
 
 #include "filigree/core/random.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "sample/bodies.h"
 
 #include <gtest/gtest.h>

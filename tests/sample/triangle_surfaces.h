@@ -1,8 +1,7 @@
 // Surfaces that are open, turned or in pieces, and their winding numbers as plain sums.
 #pragma once
 
-#include "filigree/mesh/shapes.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 #include "filigree/sample/inside_scan.h"
 
 #include <cmath>

@@ -1,10 +1,10 @@
 // A ball of jelly that is dropped, for tests.
 #pragma once
 
-#include "filigree/hierarchy/strip.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/material.h"
 #include "filigree/scene/dropped_body.h"
+#include "filigree/strip.h"
 
 #include <algorithm>
 

@@ -1,7 +1,7 @@
 #include "scene/scenes.h"
 #include "threads.h"
 
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "filigree/scene/particles_near.h"
 #include "filigree/scene/saved_state.h"
 

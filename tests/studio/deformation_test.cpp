@@ -1,6 +1,6 @@
 #include "deformation.h"
 
-#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh.h"
 
 #include <QSignalSpy>
 #include <QTest>

@@ -5,7 +5,7 @@
 #include "studio/patience.h"
 #include "viewport.h"
 
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 
 #include <QOffscreenSurface>
 #include <QOpenGLContext>

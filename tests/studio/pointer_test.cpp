@@ -7,8 +7,8 @@
 #include "sanitized.h"
 #include "studio/materials.h"
 
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 
 #include <QTemporaryDir>
 

@@ -6,7 +6,7 @@
 #include "script.h"
 #include "words.h"
 
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 
 #include <QComboBox>
 #include <QDoubleSpinBox>

@@ -5,10 +5,10 @@
 #include "monkey.h"
 #include "threads.h"
 
-#include "filigree/hierarchy/strip.h"
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "filigree/io/model_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
+#include "filigree/strip.h"
 
 #include <QElapsedTimer>
 #include <QTemporaryDir>

@@ -4,7 +4,7 @@
 
 #include "overlay.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 
 #include <QFile>
 #include <QProcess>

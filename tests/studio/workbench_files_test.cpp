@@ -2,12 +2,12 @@
 #include "io/corpus.h"
 #include "workbench_fixture.h"
 
-#include "filigree/hierarchy/strip.h"
+#include "filigree/file.h"
 #include "filigree/io/file.h"
-#include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/render.h"
+#include "filigree/strip.h"
 
 #include <QSignalSpy>
 #include <QTest>
@@ -172,7 +172,7 @@ TEST_F(WorkbenchTest, ALargeStreamIsLookedAtAndWarpedBeforeAllOfItIsRead) {
     const RunContext context;
     const Mesh mesh = make_wavy_sphere({.resolution = 150});
     const Model model = strip(mesh, {.base = 300}, context).value().model;
-    ASSERT_TRUE(write_coded_model(model, {}, {.levels = true}, path("ball.fil"), context).ok());
+    ASSERT_TRUE(pack_model(model, {}, {.levels = true}, path("ball.fil"), context).ok());
     ASSERT_GT(fs::file_size(path("ball.fil")), 1u << 18);
     std::size_t first = 0;
     QObject::connect(&bench, &Workbench::told, &bench, [&](const QString& sentence, bool) {

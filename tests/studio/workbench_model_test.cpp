@@ -2,8 +2,8 @@
 #include "studio/materials.h"
 #include "workbench_fixture.h"
 
-#include "filigree/io/mesh_file.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/file.h"
+#include "filigree/mesh.h"
 
 #include <QSignalSpy>
 

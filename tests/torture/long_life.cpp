@@ -1,14 +1,14 @@
 // A day's work in one process: strip, pose, restore, write and read, again and again; bodies simulated frame by frame.
 // Memory has to stay, and results to be at the end what they were at the beginning.
 //   long_life ROUNDS FRAMES [--leak]     (--leak keeps 100 kB a round and frame, to see that it would be noticed)
-#include <filigree/deform/space_warp.h>
 #include <filigree/deform/warp_steps.h>
-#include <filigree/hierarchy/restore.h>
-#include <filigree/hierarchy/strip.h>
 #include <filigree/io/model_file.h>
 #include <filigree/io/shared_work.h>
-#include <filigree/mesh/shapes.h>
+#include <filigree/mesh.h>
 #include <filigree/physics/simulation.h>
+#include <filigree/pose.h>
+#include <filigree/restore.h>
+#include <filigree/strip.h>
 
 #include <algorithm>
 #include <cstdio>

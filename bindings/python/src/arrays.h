@@ -3,8 +3,8 @@
 
 #include "errors.h"
 
-#include <filigree/core/types.h>
 #include <filigree/physics/body.h>
+#include <filigree/types.h>
 
 #include <pybind11/numpy.h>
 

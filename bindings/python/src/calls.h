@@ -3,7 +3,7 @@
 
 #include "errors.h"
 
-#include <filigree/core/run_context.h>
+#include <filigree/context.h>
 
 #include <condition_variable>
 #include <functional>

@@ -1,7 +1,6 @@
 #include "models.h"
 
-#include <filigree/mesh/mesh_distance.h>
-#include <filigree/mesh/topology.h>
+#include <filigree/mesh.h>
 #include <filigree/remesh/quad_quality.h>
 #include <filigree/sample.h>
 

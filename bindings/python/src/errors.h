@@ -3,7 +3,7 @@
 
 #include "areas.h"
 
-#include <filigree/core/result.h>
+#include <filigree/result.h>
 
 #include <initializer_list>
 #include <string>

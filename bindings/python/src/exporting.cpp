@@ -1,9 +1,6 @@
 #include "models.h"
 
-#include <filigree/io/gltf_export.h>
-#include <filigree/io/gltf_levels_export.h>
-#include <filigree/io/gltf_morph_export.h>
-#include <filigree/io/gltf_skin_export.h>
+#include <filigree/file.h>
 #include <filigree/io/point_cache.h>
 
 namespace filigree::python {

@@ -1,6 +1,6 @@
 #include "models.h"
 
-#include <filigree/io/mesh_file.h>
+#include <filigree/file.h>
 #include <filigree/io/model_file.h>
 #include <filigree/io/point_cache.h>
 
@@ -66,11 +66,11 @@ py::dict pack_model_file(const PyModel& model, const fs::path& path, unsigned bi
     const auto chosen = value_of<Profile>(
         profile, "profile",
         {{"compact", Profile::compact}, {"stream", Profile::stream}, {"lossless", Profile::lossless}});
-    const CodingReport report = LongCall{threads, progress}([&](const RunContext& context) {
+    const PackReport report = LongCall{threads, progress}([&](const RunContext& context) {
         if (chosen == Profile::lossless)
-            return CodingReport{.bytes = write_lossless_model(*model.model, sequence, path, context).value().bytes};
-        const MeshCodeOptions options{bits, surface, keep_order, chosen == Profile::stream};
-        return write_coded_model(*model.model, sequence, options, path, context).value();
+            return PackReport{.bytes = pack_model_lossless(*model.model, sequence, path, context).value().bytes};
+        const PackOptions options{bits, surface, keep_order, chosen == Profile::stream};
+        return pack_model(*model.model, sequence, options, path, context).value();
     });
     const double diagonal = world_bounds(model.model->mesh).diagonal();
     py::dict said, bytes;

@@ -1,9 +1,8 @@
 #include "models.h"
 
-#include <filigree/deform/handle_regions.h>
-#include <filigree/deform/handles.h>
 #include <filigree/io/handles_file.h>
-#include <filigree/mesh/triangulate.h>
+#include <filigree/mesh.h>
+#include <filigree/pose.h>
 
 #include <mutex>
 #include <numbers>

@@ -3,8 +3,7 @@
 #include "calls.h"
 #include "models.h"
 
-#include <filigree/mesh/shapes.h>
-#include <filigree/mesh/triangulate.h>
+#include <filigree/mesh.h>
 
 namespace filigree::python {
 

@@ -3,7 +3,7 @@
 
 #include "arrays.h"
 
-#include <filigree/mesh/mesh.h>
+#include <filigree/mesh.h>
 #include <filigree/sample.h>
 
 #include <memory>

@@ -1,7 +1,7 @@
 #include "models.h"
 
-#include <filigree/deform/fidelity.h>
 #include <filigree/io/model_file.h>
+#include <filigree/pose.h>
 
 namespace filigree::python {
 

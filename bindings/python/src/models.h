@@ -5,8 +5,8 @@
 #include "calls.h"
 #include "meshes.h"
 
-#include <filigree/hierarchy/restore.h>
-#include <filigree/hierarchy/strip.h>
+#include <filigree/restore.h>
+#include <filigree/strip.h>
 
 #include <memory>
 #include <optional>

@@ -1,10 +1,10 @@
 #include "models.h"
 
-#include <filigree/core/view.h>
 #include <filigree/io/file.h>
 #include <filigree/mesh/up_axis.h>
 #include <filigree/present/headless_renderer.h>
 #include <filigree/render.h>
+#include <filigree/types.h>
 
 #include <mutex>
 

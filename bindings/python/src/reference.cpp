@@ -1,5 +1,6 @@
 #include "models.h"
 
+#include <filigree/io/file.h>
 #include <filigree/io/reference_file.h>
 
 namespace filigree::python {

@@ -1,7 +1,7 @@
 #include "calls.h"
 #include "meshes.h"
 
-#include <filigree/remesh/quad_remesh.h>
+#include <filigree/remesh.h>
 
 namespace filigree::python {
 

@@ -1,6 +1,6 @@
 #include "models.h"
 
-#include <filigree/hierarchy/pose_error.h>
+#include <filigree/restore.h>
 
 namespace filigree::python {
 

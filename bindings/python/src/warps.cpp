@@ -1,8 +1,8 @@
 #include "models.h"
 
 #include <filigree/core/parallel_for.h>
-#include <filigree/deform/space_warp.h>
 #include <filigree/deform/unwarp.h>
+#include <filigree/pose.h>
 
 namespace filigree::python {
 

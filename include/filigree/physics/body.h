@@ -5,12 +5,12 @@
 // A Body does not change while it moves, so one may take part in many simulations. SI units. Next: physics/world.h.
 #pragma once
 
-#include "filigree/core/result.h"
-#include "filigree/core/run_context.h"
-#include "filigree/core/types.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/material.h"
+#include "filigree/result.h"
 #include "filigree/sample.h"
+#include "filigree/types.h"
 
 #include <array>
 #include <memory>

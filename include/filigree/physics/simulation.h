@@ -13,9 +13,9 @@
 // shared_ptr to a Body (physics/body.h). The world may change between frames: bodies come and go, obstacles are moved.
 #pragma once
 
-#include "filigree/core/types.h"
 #include "filigree/physics/body.h"
 #include "filigree/physics/world.h"
+#include "filigree/types.h"
 
 #include <limits>
 #include <optional>

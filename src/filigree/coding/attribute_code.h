@@ -3,7 +3,7 @@
 #pragma once
 
 #include "filigree/coding/geometry_code.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 namespace filigree {
 

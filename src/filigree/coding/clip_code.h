@@ -2,7 +2,7 @@
 // [principal components; Alexa and Mueller 2000].
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <optional>
 #include <span>

@@ -5,7 +5,7 @@
 #include "filigree/coding/closed_map.h"
 #include "filigree/coding/geometry_code.h"
 #include "filigree/coding/level_attributes.h"
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 
 namespace filigree {
 

@@ -1,7 +1,7 @@
 // A driver as vertices of a coded mesh: its faces, and which of the mesh's vertices its own are.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <optional>
 #include <string>

@@ -5,7 +5,7 @@
 #include "filigree/coding/closed_map.h"
 #include "filigree/coding/face_code.h"
 #include "filigree/coding/wedge.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 namespace filigree {
 

@@ -11,7 +11,7 @@
 
 namespace filigree {
 
-/// Takes the streams of CodedLevels one after the other: the coarsest, levels, refinements. Every machine reads the
+/// Takes the streams of PackedLevels one after the other: the coarsest, levels, refinements. Every machine reads the
 /// same; memory is what has been read.
 class LevelReader {
 public:

@@ -177,7 +177,7 @@ EncodedLevels encode_levels(const ClosedMap& map, std::span<const FinePlace> pla
     if (!attributes.empty() && double(coarsening.vertex.size()) > most && !context.is_cancelled())
         return encode_levels(map, places, {}, options, context);
     EncodedLevels encoded;
-    CodedLevels& code = encoded.code;
+    PackedLevels& code = encoded.code;
     SymbolWriter connectivity(kConnectivityContexts), base_places(kGeometryContexts);
     const WalkedMap coarsest = encode_connectivity(coarsening.base, connectivity);
     code.connectivity = connectivity.finish();
@@ -197,7 +197,7 @@ EncodedLevels encode_levels(const ClosedMap& map, std::span<const FinePlace> pla
     code.triangles = static_cast<std::uint32_t>(coarsest.map.triangles.size());
 
     std::size_t begin = walk.rings.vertex_count(); // of the level
-    CodedLevel level;
+    PackedLevel level;
     for (std::size_t i = coarsening.batches.size(); i-- > 0 && !context.is_cancelled();) {
         writer.begin_batch(coarsening.batches[i]);
         if (!walk.run_batch(kNoIndex)) // two triangles of three same vertices: which has which wedge cannot be said
@@ -213,7 +213,7 @@ EncodedLevels encode_levels(const ClosedMap& map, std::span<const FinePlace> pla
     if (options.is_refined) {
         SymbolWriter out(0);
         std::size_t from = code.vertices;
-        for (CodedLevel& coded : code.levels) {
+        for (PackedLevel& coded : code.levels) {
             const std::size_t count = coded.vertices - from;
             coded.refinement =
                 code_refinement(places, writer.vertices, std::span(walk.frames).subspan(from - code.vertices, count),

@@ -5,7 +5,7 @@
 #include "filigree/coding/connectivity_code.h"
 #include "filigree/coding/geometry_code.h"
 #include "filigree/coding/level_attributes.h"
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 
 namespace filigree {
 
@@ -16,7 +16,7 @@ struct LevelCodeOptions {
 };
 
 struct EncodedLevels {
-    CodedLevels code;
+    PackedLevels code;
     WalkedMap walked;                 ///< the whole map, as a reader will have it
     std::vector<FinePlace> read = {}; ///< its places
 };

@@ -1,7 +1,7 @@
 // Lists of vertices as they are: faces in their order, corners of attributes, records of a model's blocks.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <cstdint>
 #include <optional>

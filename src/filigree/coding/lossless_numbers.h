@@ -2,7 +2,7 @@
 // one rounded sum of floats, so that every machine reads the same.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <cstdint>
 #include <optional>

@@ -25,10 +25,10 @@ struct Damage {};
 
 constexpr std::size_t kCoarsestVertices = 500;
 
-GeometrySteps steps_of(const MeshCodeOptions& options) { return {1, options.surface ? 4 : 1}; }
+GeometrySteps steps_of(const PackOptions& options) { return {1, options.surface ? 4 : 1}; }
 
 /// Sixteenths of a step from the box's corner. A vertex that no face meets may lie further out than they reach.
-FinePlace fine_place(const Vec3f& position, const CodedMesh& coded) {
+FinePlace fine_place(const Vec3f& position, const PackedMesh& coded) {
     constexpr double kMost = kFarthest - kFine;
     FinePlace place{};
     for (int k = 0; k < 3; ++k) {
@@ -38,14 +38,14 @@ FinePlace fine_place(const Vec3f& position, const CodedMesh& coded) {
     return place;
 }
 
-Vec3f position_of(const FinePlace& place, const CodedMesh& coded) {
+Vec3f position_of(const FinePlace& place, const PackedMesh& coded) {
     Vec3f position;
     for (int k = 0; k < 3; ++k)
         position[k] = static_cast<float>(coded.low[std::size_t(k)] + coded.step * place[std::size_t(k)] / kFine);
     return position;
 }
 
-std::vector<Vec3f> positions_of(std::span<const FinePlace> places, const CodedMesh& coded) {
+std::vector<Vec3f> positions_of(std::span<const FinePlace> places, const PackedMesh& coded) {
     std::vector<Vec3f> positions;
     positions.reserve(places.size());
     for (const FinePlace& place : places) positions.push_back(position_of(place, coded));
@@ -163,7 +163,7 @@ Mesh put_back(const Mesh& mesh, std::string_view stream) {
 }
 
 /// Those that no face meets, along Morton's curve, so that each is near the one before.
-void sort_loose(const Mesh& mesh, const CodedMesh& coded, std::span<Index> loose) {
+void sort_loose(const Mesh& mesh, const PackedMesh& coded, std::span<Index> loose) {
     std::vector<std::pair<std::uint64_t, Index>> keys;
     for (const Index v : loose) {
         constexpr std::uint32_t kCounted = (1u << 20) - 1; // bits of a coordinate
@@ -177,7 +177,7 @@ void sort_loose(const Mesh& mesh, const CodedMesh& coded, std::span<Index> loose
 // --- Faces and places ---------------------------------------------------------------------------------------------
 
 /// Of a quad mesh with subdivision connectivity.
-std::optional<OrderedMesh> encode_regular_shape(const Mesh& mesh, CodedMesh& coded, const RunContext& context) {
+std::optional<OrderedMesh> encode_regular_shape(const Mesh& mesh, PackedMesh& coded, const RunContext& context) {
     std::vector<FinePlace> places;
     for (const Vec3f& position : mesh.positions) places.push_back(fine_place(position, coded));
     SymbolWriter faces_out(kFaceContexts), places_out(kPlaceContexts);
@@ -199,7 +199,7 @@ std::optional<OrderedMesh> encode_regular_shape(const Mesh& mesh, CodedMesh& cod
 }
 
 /// Of any mesh.
-OrderedMesh encode_shape(const Mesh& mesh, CodedMesh& coded, const RunContext& context) {
+OrderedMesh encode_shape(const Mesh& mesh, PackedMesh& coded, const RunContext& context) {
     SymbolWriter faces_out(kFaceContexts), places_out(kPlaceContexts);
     faces_out.bits(false, 1);
     EncodedLevels levels;
@@ -255,20 +255,20 @@ OrderedMesh encode_shape(const Mesh& mesh, CodedMesh& coded, const RunContext& c
     return ordered;
 }
 
-LevelReader decode_levels(const CodedMesh& coded, const RunContext& context) {
+LevelReader decode_levels(const PackedMesh& coded, const RunContext& context) {
     const LevelCodeOptions options = level_options(coded.options);
     LevelReader reader(options.steps, options.is_refined, most_triangles(coded.corners));
     if (!reader.read_coarsest(coded.levels.connectivity, coded.levels.places, coded.levels.attributes)) throw Damage();
-    for (const CodedLevel& level : coded.levels.levels)
+    for (const PackedLevel& level : coded.levels.levels)
         if (context.is_cancelled() || !reader.read_level(level.splits, level.batches)) throw Damage();
-    for (const CodedLevel& level : coded.levels.levels)
+    for (const PackedLevel& level : coded.levels.levels)
         if (options.is_refined && !reader.refine_level(level.refinement)) throw Damage();
     return reader;
 }
 
 /// Of any mesh, as encode_shape wrote it; and those of its attributes that its levels have. Throws Damage.
-CodedShape decode_shape(const CodedMesh& coded, SymbolReader& faces_in, SymbolReader& places_in, LevelValues& in_levels,
-                        const RunContext& context) {
+CodedShape decode_shape(const PackedMesh& coded, SymbolReader& faces_in, SymbolReader& places_in,
+                        LevelValues& in_levels, const RunContext& context) {
     std::optional<WalkedFaces> walked;
     std::optional<LevelReader> levels;
     std::vector<Index> wedge_at;
@@ -305,7 +305,7 @@ CodedShape decode_shape(const CodedMesh& coded, SymbolReader& faces_in, SymbolRe
     return shape;
 }
 
-Mesh decode(const CodedMesh& coded, const RunContext& context) {
+Mesh decode(const PackedMesh& coded, const RunContext& context) {
     if (coded.vertices >= kNoIndex || coded.corners >= kNoIndex / 4 || !(coded.step > 0) ||
         !std::isfinite(coded.step * (1 << 27)))
         throw Damage();
@@ -338,14 +338,14 @@ Mesh decode(const CodedMesh& coded, const RunContext& context) {
 
 } // namespace
 
-LevelCodeOptions level_options(const MeshCodeOptions& options) {
+LevelCodeOptions level_options(const PackOptions& options) {
     const std::int32_t long_step = 4;
     return {.fewest = kCoarsestVertices,
             .steps = options.surface ? steps_of(options) : GeometrySteps{long_step, long_step},
             .is_refined = !options.surface};
 }
 
-Mesh mesh_of_levels(const LevelReader& levels, const CodedMesh& coded) {
+Mesh mesh_of_levels(const LevelReader& levels, const PackedMesh& coded) {
     const std::vector<bool> closes_hole = levels.closes_hole();
     const std::vector<Triangle> triangles = levels.triangles();
     const AttributeOutline& outline = levels.outline();
@@ -384,8 +384,8 @@ Mesh mesh_of_levels(const LevelReader& levels, const CodedMesh& coded) {
     return mesh;
 }
 
-Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, MeshCodeReport* report,
-                              const RunContext& context) {
+Result<PackedMesh> pack_mesh(const Mesh& mesh, const PackOptions& options, PackedMeshReport* report,
+                             const RunContext& context) {
     if (options.bits < 10 || options.bits > 16)
         return Error{ErrorCode::usage,
                      "Positions are coded with 10 to 16 bits; " + std::to_string(options.bits) + " were asked for."};
@@ -393,7 +393,7 @@ Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, 
     if (mesh.vertex_count() == 0) return Error{ErrorCode::unsuitable, "The mesh has no vertices: nothing to code."};
     if (mesh.corner_count() >= kNoIndex / 4)
         return Error{ErrorCode::unsuitable, "The mesh has more than a thousand million corners: too many to code."};
-    CodedMesh coded;
+    PackedMesh coded;
     coded.vertices = mesh.vertex_count();
     coded.faces = mesh.face_count();
     coded.corners = mesh.corner_count();
@@ -446,7 +446,7 @@ Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, 
     return coded;
 }
 
-Result<Mesh> decode_mesh(const CodedMesh& coded, const RunContext& context) {
+Result<Mesh> unpack_mesh(const PackedMesh& coded, const RunContext& context) {
     try {
         Mesh mesh = decode(coded, context);
         if (const std::string wrong = check_mesh(mesh); !wrong.empty())

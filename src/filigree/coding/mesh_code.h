@@ -2,38 +2,31 @@
 // on.
 #pragma once
 
+#include "filigree/pack.h"
+
 #include "filigree/coding/coded_levels.h"
-#include "filigree/core/result.h"
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
+#include "filigree/result.h"
 
 #include <string>
 
 namespace filigree {
 
-struct MeshCodeOptions {
-    unsigned bits = 14; ///< of positions along the longest side of the box, 10 to 16
-    /// Steps across the surface four times as long as along its normal: vertices slide in the surface.
-    bool surface = false;
-    bool keep_order = false; ///< vertices, faces and first corners come back in their order
-    bool levels = false;     ///< coarse to fine, so that every beginning is a mesh, see coded_levels.h
-    bool operator==(const MeshCodeOptions&) const = default;
-};
-
 /// A mesh as streams. Names of objects, groups, materials and scalars, and embedded pictures are not in them: they are
 /// the mesh's own still, in `rest`, which has no vertices and no faces.
-struct CodedMesh {
+struct PackedMesh {
     std::uint64_t vertices = 0, faces = 0, corners = 0;
     std::array<double, 3> low{}; ///< the box's corner, relative to the origin
     double step = 0;             ///< between places along an axis
-    MeshCodeOptions options = {};
+    PackOptions options = {};
     std::string connectivity = {}, places = {}, attributes = {}, order = {};
-    CodedLevels levels = {}; ///< with options.levels: the map and its places; the other streams have the rest
+    PackedLevels levels = {}; ///< with options.levels: the map and its places; the other streams have the rest
     Mesh rest = {};
 };
 
 /// What was where before, and how far it is off.
-struct MeshCodeReport {
+struct PackedMeshReport {
     std::vector<Index> vertex;   ///< of each coded vertex: which one it was
     double rms = 0, largest = 0; ///< of the places, model units; of the vertices that faces meet, if any
     /// Vertices that no face meets, so far from the others (four boxes or more) that they come back nearer.
@@ -42,12 +35,12 @@ struct MeshCodeReport {
 
 /// Errors: usage (bits; check_mesh refuses the mesh), unsuitable (nothing to code), cancelled. Cost O(size log size),
 /// about 0.6 processor seconds a million vertices.
-Result<CodedMesh> encode_mesh(const Mesh& mesh, const MeshCodeOptions& options, MeshCodeReport* report,
-                              const RunContext& context);
+Result<PackedMesh> pack_mesh(const Mesh& mesh, const PackOptions& options, PackedMeshReport* report,
+                             const RunContext& context);
 
 /// The mesh; without keep_order its vertices and faces are in the order of the code. Every machine and number of
 /// threads gives the same. Errors: bad_file (damaged), cancelled. Cost O(size), about 0.4 processor seconds a million
 /// vertices.
-Result<Mesh> decode_mesh(const CodedMesh& coded, const RunContext& context);
+Result<Mesh> unpack_mesh(const PackedMesh& coded, const RunContext& context);
 
 } // namespace filigree

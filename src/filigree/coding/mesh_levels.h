@@ -8,10 +8,10 @@
 namespace filigree {
 
 /// How a mesh's levels are coded: steps four times as long first, then quarters of them, unless they are long already.
-LevelCodeOptions level_options(const MeshCodeOptions& options);
+LevelCodeOptions level_options(const PackOptions& options);
 
 /// What a reader of levels has so far, as triangles: texture coordinates, materials and colours where levels have any,
 /// no normals. Copies of vertices where sheets meet.
-Mesh mesh_of_levels(const LevelReader& levels, const CodedMesh& coded);
+Mesh mesh_of_levels(const LevelReader& levels, const PackedMesh& coded);
 
 } // namespace filigree

@@ -2,7 +2,7 @@
 
 #include "filigree/coding/face_code.h"
 #include "filigree/coding/integer_frame.h"
-#include "filigree/mesh/regular_patches.h"
+#include "filigree/mesh.h"
 
 #include <algorithm>
 #include <cstdlib>

@@ -5,8 +5,8 @@
 #pragma once
 
 #include "filigree/coding/geometry_code.h"
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 
 #include <optional>
 

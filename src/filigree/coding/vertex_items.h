@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/core/hash.h"
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <unordered_map>
 

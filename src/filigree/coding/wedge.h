@@ -1,7 +1,7 @@
 // What a surface has besides places while it grows: wedges of vertices, and what their numbers mean.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 // Colours as people write them.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <optional>
 #include <string_view>

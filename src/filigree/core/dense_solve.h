@@ -2,7 +2,7 @@
 // compiled once, for the whole library.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <Eigen/Geometry>
 

@@ -1,7 +1,7 @@
 // Which things belong together, as pairs of them are joined.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <atomic>
 #include <numeric>

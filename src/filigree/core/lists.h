@@ -1,7 +1,7 @@
 // Many lists end to end in one array, and orders.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <cassert>
 #include <cstddef>

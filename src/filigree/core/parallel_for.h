@@ -1,7 +1,7 @@
 // Loops over index ranges on all threads of a RunContext.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 
 #include <cstddef>
 

@@ -1,4 +1,4 @@
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 
 #include <algorithm>
 #include <map>

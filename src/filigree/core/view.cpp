@@ -1,4 +1,4 @@
-#include "filigree/core/view.h"
+#include "filigree/types.h"
 
 namespace filigree {
 

@@ -1,7 +1,7 @@
 #include "filigree/deform/carried_points.h"
 
 #include "filigree/core/parallel_for.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 // Points inside a mesh that go along with its driver.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/hierarchy/pose.h"
+#include "filigree/context.h"
+#include "filigree/strip.h"
 
 #include <span>
 #include <vector>

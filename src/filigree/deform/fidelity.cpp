@@ -1,9 +1,9 @@
-#include "filigree/deform/fidelity.h"
+#include "filigree/pose.h"
 
 #include "filigree/hierarchy/gradient_fit.h"
-#include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/sampled_restorer.h"
-#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh.h"
+#include "filigree/restore.h"
 
 #include <algorithm>
 #include <cmath>

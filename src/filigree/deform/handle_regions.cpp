@@ -1,9 +1,8 @@
-#include "filigree/deform/handle_regions.h"
+#include "filigree/pose.h"
 
-#include "filigree/deform/handles.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/triangulate.h"
 #include "filigree/mesh/weld.h"
 
 #include <algorithm>

@@ -13,7 +13,7 @@
 //   [Nesterov 1983], [O'Donoghue 2015] Momentum: a round starts from where the last ones were heading, and where that
 //   raises the energy it is undone and the momentum starts anew. A third to a tenth of the rounds.
 // New solves start from the last solution moved by the best rigid motion of the handles, so a rigid motion is exact.
-#include "filigree/deform/handles.h"
+#include "filigree/pose.h"
 
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"

@@ -1,10 +1,10 @@
-#include "filigree/deform/pull.h"
+#include "filigree/pose.h"
 
-#include "filigree/deform/handles.h"
+#include "filigree/hierarchy/blend_code.h"
 #include "filigree/hierarchy/pose_mesh.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/weld.h"
+#include "filigree/restore.h"
 
 #include <algorithm>
 #include <array>

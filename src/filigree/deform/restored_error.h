@@ -1,9 +1,9 @@
 // How far what is restored is from what deforming every vertex gives.
 #pragma once
 
-#include "filigree/hierarchy/pose.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 
 namespace filigree {
 

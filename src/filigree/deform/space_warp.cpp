@@ -4,7 +4,7 @@
 //   and cosine and stays exact as the angle goes to zero. [Carr 2001] Reconstruction and representation of 3D objects
 //   with radial basis functions: the kernel r^3. The affine part is split off by a QR factorisation, so that centres on
 //   a plane or a line need no special case.
-#include "filigree/deform/space_warp.h"
+#include "filigree/pose.h"
 
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"

@@ -1,7 +1,7 @@
 // The way back through a warp.
 #pragma once
 
-#include "filigree/deform/space_warp.h"
+#include "filigree/pose.h"
 
 namespace filigree {
 

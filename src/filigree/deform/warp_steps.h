@@ -1,7 +1,7 @@
 // Warps as settings: a kind and an amount each.
 #pragma once
 
-#include "filigree/deform/space_warp.h"
+#include "filigree/pose.h"
 
 #include <memory>
 #include <span>

@@ -1,5 +1,6 @@
 #include "filigree/fracture/broken_model.h"
 #include "filigree/fracture.h"
+#include "filigree/hierarchy/blend_code.h"
 
 #include "filigree/fracture/crack_surfaces.h"
 #include "filigree/fracture/planar_fill.h"

@@ -2,8 +2,7 @@
 #pragma once
 
 #include "filigree/fracture.h"
-#include "filigree/hierarchy/model.h"
-#include "filigree/hierarchy/pose.h"
+#include "filigree/strip.h"
 
 namespace filigree {
 

@@ -6,7 +6,7 @@
 // coincidences.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <array>
 

@@ -1,7 +1,7 @@
 // A constrained Delaunay triangulation of integer points in the plane, with winding numbers.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <array>
 #include <optional>

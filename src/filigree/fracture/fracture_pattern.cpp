@@ -4,7 +4,7 @@
 #include "filigree/core/random.h"
 #include "filigree/fracture/cell_clumps.h"
 #include "filigree/fracture/crack_warp.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 #include "filigree/sample.h"
 #include "filigree/sample/closure.h"
 

@@ -1,8 +1,8 @@
 // Triangles that fill outlines in a plane, and always close with them.
 #pragma once
 
-#include "filigree/core/types.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
+#include "filigree/types.h"
 
 namespace filigree {
 

@@ -1,7 +1,7 @@
 // The Voronoi (power) diagram of seeds on the grid, as combinatorics.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/fracture/cell_signs.h"
 
 namespace filigree {

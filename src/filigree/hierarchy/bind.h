@@ -1,7 +1,7 @@
 // Which driver triangle each vertex belongs to.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/hierarchy/loose_parts.h"
 #include "filigree/mesh/surface.h"
 

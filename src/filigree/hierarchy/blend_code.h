@@ -9,7 +9,9 @@
 // Affine deformations are exact; for curved ones the error is of second order in |p - m|, the detail's own height.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/strip.h"
+
+#include "filigree/context.h"
 #include "filigree/hierarchy/bind.h"
 
 #include <array>
@@ -22,24 +24,6 @@ namespace blend_kernel {
 struct Records;
 struct VertexTransform;
 } // namespace blend_kernel
-
-/// float32: 20 bytes a vertex. int16: 10 bytes, faster where memory is the bound; an error of at most half a step an
-/// axis, and 32767 steps are the largest offset in the cell: usually below 1e-6 of the diagonal.
-enum class Precision { float32, int16 };
-
-/// Records in the order of their cells, so that restoring gathers nothing. Record r is vertex order[r] of the mesh.
-struct BlendDetail {
-    /// Three driver vertices each (positions in the driver level's list), with the weights 1 - u - v, u and v.
-    std::vector<Triangle> cells;
-    std::vector<Index> cell_offsets = {0}; ///< records of cell c: cell_offsets[c] .. cell_offsets[c + 1] - 1
-    std::vector<Index> order;              ///< a permutation of the mesh's vertices
-    std::vector<float> u, v;               ///< weights of each record; multiples of 1/32767 for int16
-    Precision precision = Precision::float32;
-    std::vector<std::array<std::int16_t, 3>> offsets; ///< int16 only: (p - m) / cell_scales[cell]
-    std::vector<float> cell_scales;                   ///< int16 only: model units of one step
-
-    std::vector<Index> across_gap, facing_away; ///< see Binding; ascending vertex ids
-};
 
 /// Sorts bonds into records; for int16 rounds the weights first, then the offsets from them, so that rounding the
 /// weights costs nothing. positions: the mesh's; driver: the driver's vertex ids. Cost O(V).

@@ -1,8 +1,8 @@
 // The inner loop of the blend code: records of many cells, sixteen (or eight, or four) vertices at a time.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 
 namespace filigree::blend_kernel {
 

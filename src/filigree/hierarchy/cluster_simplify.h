@@ -1,7 +1,7 @@
 // The first levels of large meshes: many clusters simplified at the same time, whose borders move every round.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/hierarchy/bind.h"
 #include "filigree/hierarchy/simplify.h"
 

@@ -1,8 +1,8 @@
 // Edge collapses that can always go on: for the last, coarsest levels, where the driver's quality is decided.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 
 #include <optional>
 

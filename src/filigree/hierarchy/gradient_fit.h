@@ -1,7 +1,7 @@
 // Gradients of a driver from its positions alone.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/mesh/edges.h"
 
 namespace filigree {

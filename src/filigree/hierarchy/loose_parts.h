@@ -1,7 +1,7 @@
 // Parts of a mesh that its driver has no vertex of: rivets, buttons, eyelashes, leaves, loose vertices.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/mesh/surface.h"
 
 namespace filigree {

@@ -1,4 +1,4 @@
-#include "filigree/hierarchy/model.h"
+#include "filigree/strip.h"
 
 #include <algorithm>
 #include <cmath>

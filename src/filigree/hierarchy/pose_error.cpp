@@ -1,8 +1,7 @@
-#include "filigree/hierarchy/pose_error.h"
+#include "filigree/restore.h"
 
 #include "filigree/core/random.h"
 #include "filigree/hierarchy/gradient_fit.h"
-#include "filigree/hierarchy/restore.h"
 #include "filigree/hierarchy/sampled_restorer.h"
 
 #include <algorithm>

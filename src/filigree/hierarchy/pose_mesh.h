@@ -1,7 +1,7 @@
 // Poses as meshes: the driver for other programs to move, and the pose that comes back.
 #pragma once
 
-#include "filigree/hierarchy/model.h"
+#include "filigree/strip.h"
 
 #include <string_view>
 

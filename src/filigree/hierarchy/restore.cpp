@@ -1,5 +1,7 @@
-#include "filigree/hierarchy/restore.h"
+#include "filigree/restore.h"
 
+#include "filigree/hierarchy/blend_code.h"
+#include "filigree/hierarchy/gradient_fit.h"
 #include "filigree/mesh/normals.h"
 
 #include <mutex>

@@ -1,7 +1,7 @@
 // A mesh made rough for meshoptimizer, so that its simplification spreads vertices over flat and straight parts too.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <span>
 #include <vector>

@@ -1,6 +1,7 @@
 #include "filigree/hierarchy/sampled_restorer.h"
 
 #include "filigree/core/random.h"
+#include "filigree/hierarchy/blend_code.h"
 
 #include <cmath>
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/hierarchy/blend_code.h"
-#include "filigree/hierarchy/model.h"
+#include "filigree/strip.h"
 
 namespace filigree {
 

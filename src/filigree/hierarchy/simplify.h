@@ -1,8 +1,8 @@
 // Levels for any mesh: edge collapses in the order of their error, keeping a subset of the vertices.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 
 #include <optional>
 

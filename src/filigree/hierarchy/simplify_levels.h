@@ -3,9 +3,8 @@
 
 #include "filigree/hierarchy/bind.h"
 #include "filigree/hierarchy/cluster_simplify.h"
-#include "filigree/hierarchy/model.h"
-#include "filigree/hierarchy/strip.h"
 #include "filigree/mesh/surface.h"
+#include "filigree/strip.h"
 
 namespace filigree {
 

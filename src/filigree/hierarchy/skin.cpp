@@ -1,7 +1,6 @@
-#include "filigree/hierarchy/skin.h"
+#include "filigree/restore.h"
 
 #include "filigree/core/dense_solve.h"
-#include "filigree/hierarchy/restore.h"
 
 #include <algorithm>
 #include <cmath>

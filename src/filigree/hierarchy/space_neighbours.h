@@ -1,9 +1,9 @@
 // For each vertex of a driver the vertices around it in space that tell how the matter there is deformed.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/edges.h"
-#include "filigree/mesh/mesh.h"
 
 namespace filigree {
 

@@ -1,8 +1,9 @@
-#include "filigree/hierarchy/strip.h"
+#include "filigree/strip.h"
 
 #include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/text.h"
+#include "filigree/hierarchy/blend_code.h"
 #include "filigree/hierarchy/simplify_levels.h"
 #include "filigree/hierarchy/vertex_order.h"
 #include "filigree/mesh/closest_point.h"

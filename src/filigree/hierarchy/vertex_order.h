@@ -1,9 +1,9 @@
 // Vertices in another order: what is near in space lies together, so that restoring streams through memory.
 #pragma once
 
+#include "filigree/context.h"
 #include "filigree/core/lists.h"
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 #include <span>
 #include <vector>

@@ -1,7 +1,9 @@
 // Whole files in and out: read at once, written beside the target and renamed.
 #pragma once
 
-#include "filigree/core/result.h"
+#include "filigree/file.h"
+
+#include "filigree/result.h"
 
 #include <cstdint>
 #include <filesystem>
@@ -11,9 +13,6 @@
 #include <string_view>
 
 namespace filigree {
-
-/// The bytes of a file; "-" is standard input. Errors: not_found (missing, a directory, no permission), out_of_memory.
-Result<std::string> read_file(const std::filesystem::path& path);
 
 /// A file whose pieces are read when they are asked for. A pipe or standard input is read whole when it is opened.
 class FileReader {
@@ -49,8 +48,6 @@ private:
 /// before the rename, and on file systems without such files (NFS, FAT). It then leaves ".filigree-X.tmp", which the
 /// next writing of the same file removes.
 Status write_file(const std::filesystem::path& path, std::span<const std::string_view> pieces);
-/// The same of one piece.
-Status write_file(const std::filesystem::path& path, std::string_view bytes);
 
 /// A file that is written piece by piece without being in memory, under the same promises as write_file.
 class FileWriter {

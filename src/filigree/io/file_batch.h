@@ -1,7 +1,7 @@
 // Several files that come into one folder together: the frames of a sequence.
 #pragma once
 
-#include "filigree/core/result.h"
+#include "filigree/result.h"
 
 #include <filesystem>
 #include <memory>

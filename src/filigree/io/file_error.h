@@ -1,7 +1,7 @@
 // Sentences for what the system refuses to do with a file.
 #pragma once
 
-#include "filigree/core/result.h"
+#include "filigree/result.h"
 
 #include <filesystem>
 #include <string>

@@ -1,10 +1,10 @@
 // A GLB being put together: the JSON chunk, and the binary chunk whose large parts are made while they are written.
 #pragma once
 
-#include "filigree/core/result.h"
-#include "filigree/core/run_context.h"
-#include "filigree/core/types.h"
+#include "filigree/context.h"
 #include "filigree/io/gltf_component.h"
+#include "filigree/result.h"
+#include "filigree/types.h"
 
 #include <array>
 #include <cstdint>

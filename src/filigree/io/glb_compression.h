@@ -1,7 +1,7 @@
 // A GLB's buffer views packed by EXT_meshopt_compression, and its normals in bytes (KHR_mesh_quantization).
 #pragma once
 
-#include "filigree/core/result.h"
+#include "filigree/result.h"
 
 #include <string>
 #include <string_view>

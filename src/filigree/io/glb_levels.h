@@ -1,8 +1,8 @@
 // Levels of a model as GLB's meshes, with materials also where faces have no labels.
 #pragma once
 
-#include "filigree/hierarchy/model.h"
 #include "filigree/io/glb_parts.h"
+#include "filigree/strip.h"
 
 #include <filesystem>
 #include <string>

@@ -3,8 +3,8 @@
 #include "filigree/core/srgb.h"
 #include "filigree/io/file.h"
 #include "filigree/io/losses.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/triangulate.h"
 
 #include <algorithm>
 #include <array>

@@ -3,7 +3,7 @@
 
 #include "filigree/io/glb_builder.h"
 #include "filigree/io/material_file.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 #include <span>
 #include <string>

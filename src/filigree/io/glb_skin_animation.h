@@ -1,10 +1,10 @@
 // A driver's motion as keys of a skin's joints.
 #pragma once
 
-#include "filigree/hierarchy/skin.h"
+#include "filigree/file.h"
 #include "filigree/io/glb_builder.h"
 #include "filigree/io/gltf_export_error.h"
-#include "filigree/io/gltf_skin_export.h"
+#include "filigree/restore.h"
 
 #include <array>
 #include <utility>

@@ -1,9 +1,9 @@
 // glTF 2.0 scenes from .gltf and .glb files: meshes in their pose, and their animations, evaluated.
 #pragma once
 
-#include "filigree/core/result.h"
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
+#include "filigree/result.h"
 
 #include <filesystem>
 #include <memory>

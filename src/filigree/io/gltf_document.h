@@ -1,10 +1,10 @@
 // A glTF file's JSON, buffers and accessors: everything that is in the file is checked here, when it is asked for.
 #pragma once
 
-#include "filigree/core/result.h"
-#include "filigree/core/run_context.h"
-#include "filigree/core/types.h"
+#include "filigree/context.h"
 #include "filigree/io/gltf_component.h"
+#include "filigree/result.h"
+#include "filigree/types.h"
 
 #include <cstdint>
 #include <filesystem>

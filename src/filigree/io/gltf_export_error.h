@@ -1,9 +1,9 @@
 // How far an exported animation is from our own restore, at its keys and between them.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/hierarchy/pose.h"
-#include "filigree/io/gltf_export_report.h"
+#include "filigree/context.h"
+#include "filigree/file.h"
+#include "filigree/strip.h"
 
 #include <functional>
 #include <span>

@@ -1,5 +1,5 @@
 // The levels of a model as GLB: alternatives of one node [MSFT_lod].
-#include "filigree/io/gltf_levels_export.h"
+#include "filigree/file.h"
 
 #include "filigree/io/glb_levels.h"
 #include "filigree/io/losses.h"

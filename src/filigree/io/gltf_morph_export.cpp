@@ -1,5 +1,5 @@
 // Morph targets: every frame a target, and weights that hand over from one to the next.
-#include "filigree/io/gltf_morph_export.h"
+#include "filigree/file.h"
 
 #include "filigree/io/glb_parts.h"
 #include "filigree/io/losses.h"

@@ -1,7 +1,6 @@
 // Skins: the layout of nodes and why it is like this are in docs/exchange.md.
-#include "filigree/io/gltf_skin_export.h"
+#include "filigree/file.h"
 
-#include "filigree/hierarchy/skin.h"
 #include "filigree/io/glb_levels.h"
 #include "filigree/io/glb_parts.h"
 #include "filigree/io/glb_skin_animation.h"
@@ -9,6 +8,7 @@
 #include "filigree/io/gltf_export_error.h"
 #include "filigree/io/losses.h"
 #include "filigree/mesh/normals.h"
+#include "filigree/restore.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include "filigree/io/handles_file.h"
 
-#include "filigree/core/view.h"
+#include "filigree/types.h"
 
 #include "filigree/io/file.h"
 #include "filigree/io/text_scanner.h"

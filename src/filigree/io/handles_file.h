@@ -1,7 +1,7 @@
 // Handles in a JSON file (docs/handles.md).
 #pragma once
 
-#include "filigree/deform/handle_regions.h"
+#include "filigree/pose.h"
 
 #include <filesystem>
 #include <vector>

@@ -1,7 +1,7 @@
 #include "filigree/io/losses.h"
 
+#include "filigree/file.h"
 #include "filigree/hierarchy/pose_mesh.h"
-#include "filigree/io/mesh_file.h"
 #include "filigree/io/text_scanner.h"
 
 #include <algorithm>

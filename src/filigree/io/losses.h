@@ -1,7 +1,7 @@
 // What a format cannot hold, said in one sentence.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 #include <string>
 #include <vector>

@@ -1,8 +1,8 @@
 // Materials of a mesh: embedded in it, or the colours and pictures that an OBJ's .mtl names.
 #pragma once
 
-#include "filigree/core/result.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
+#include "filigree/result.h"
 
 #include <filesystem>
 #include <memory>

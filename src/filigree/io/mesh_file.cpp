@@ -1,4 +1,4 @@
-#include "filigree/io/mesh_file.h"
+#include "filigree/file.h"
 #include "filigree/io/extension.h"
 #include "filigree/io/file.h"
 #include "filigree/io/gltf.h"

@@ -1,8 +1,8 @@
 // The readers and writers behind mesh_file.h: a pair for each format, told what the dispatcher knows.
 #pragma once
 
+#include "filigree/file.h"
 #include "filigree/io/losses.h"
-#include "filigree/io/mesh_file.h"
 #include "filigree/io/text_scanner.h"
 
 #include <algorithm>

@@ -1,9 +1,10 @@
 // What all model files have in common: a mesh and its levels as sections.
 #pragma once
 
-#include "filigree/hierarchy/model.h"
+#include "filigree/io/file.h"
 #include "filigree/io/model_file.h"
 #include "filigree/io/model_sections.h"
+#include "filigree/strip.h"
 
 #include <new>
 #include <stdexcept>

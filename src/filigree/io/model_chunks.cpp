@@ -1,8 +1,11 @@
 #include "filigree/io/model_chunks.h"
 
+#include "filigree/hierarchy/blend_code.h"
 #include "filigree/io/extension.h"
+#include "filigree/io/file.h"
 #include "filigree/io/model_file.h"
 #include "filigree/io/model_records.h"
+#include "filigree/io/point_cache.h"
 #include "filigree/io/point_cache_formats.h"
 
 #include <algorithm>

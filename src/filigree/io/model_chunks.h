@@ -1,9 +1,10 @@
 // A model that stays in its file, for meshes that are larger than memory: restored chunk by chunk.
 #pragma once
 
-#include "filigree/hierarchy/restore.h"
+#include "filigree/hierarchy/blend_code.h"
 #include "filigree/io/file.h"
 #include "filigree/io/point_cache.h"
+#include "filigree/restore.h"
 
 namespace filigree {
 

@@ -2,11 +2,12 @@
 
 #include "filigree/coding/clip_code.h"
 #include "filigree/coding/driver_code.h"
+#include "filigree/coding/mesh_code.h"
 #include "filigree/coding/mesh_levels.h"
-#include "filigree/hierarchy/restore.h"
-#include "filigree/hierarchy/strip.h"
 #include "filigree/hierarchy/vertex_order.h"
 #include "filigree/mesh/measured_surface.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 
 #include <ranges>
 
@@ -103,7 +104,7 @@ PoseSequence with_gradients(const Model& model, const PoseSequence& poses, const
     return filled;
 }
 
-void code_clips(const Model& model, const PoseSequence& poses, CodedModel& coded) {
+void code_clips(const Model& model, const PoseSequence& poses, PackedModel& coded) {
     const Level& driver = model.driver();
     const ClipOrder order = clip_order(driver.face_offsets, driver.corners, driver.vertices.size());
     coded.clip = {static_cast<std::uint32_t>(poses.frames.size()), poses.frames[0].gradients.empty() ? 3u : 12u};
@@ -136,7 +137,7 @@ Mesh as_fans(const Mesh& mesh) {
 }
 
 /// How far the surface of every beginning of a stream is off; the last one's is that of all of it.
-std::vector<FileLevel> levels_of(const CodedMesh& coded, const Mesh& mesh, const RunContext& context) {
+std::vector<FileLevel> levels_of(const PackedMesh& coded, const Mesh& mesh, const RunContext& context) {
     const LevelCodeOptions options = level_options(coded.options);
     LevelReader reader(options.steps, options.is_refined, kNoIndex);
     constexpr std::size_t kSamples = 20'000;
@@ -152,23 +153,23 @@ std::vector<FileLevel> levels_of(const CodedMesh& coded, const Mesh& mesh, const
                 error = static_cast<float>(distance->rms_distance);
         levels.push_back({vertices, triangles, batches, error});
     };
-    const CodedLevels& code = coded.levels;
+    const PackedLevels& code = coded.levels;
     reader.read_coarsest(code.connectivity, code.places, code.attributes);
     add(code.vertices, code.triangles, 0);
-    for (const CodedLevel& level : code.levels) {
+    for (const PackedLevel& level : code.levels) {
         reader.read_level(level.splits, level.batches);
         add(level.vertices, level.triangles, level.batches);
     }
     if (!options.is_refined || code.levels.empty()) return levels;
-    for (const CodedLevel& level : code.levels) reader.refine_level(level.refinement);
+    for (const PackedLevel& level : code.levels) reader.refine_level(level.refinement);
     add(code.levels.back().vertices, code.levels.back().triangles, 0);
     return levels;
 }
 
 } // namespace
 
-Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, const MeshCodeOptions& options,
-                              const RunContext& context) {
+Result<PackedModel> code_model(const Model& model, const PoseSequence& poses, const PackOptions& options,
+                               const RunContext& context) {
     const bool elsewhere = model.driver_is_behind;
     if (elsewhere && options.levels)
         return Error{ErrorCode::unsuitable, "The model was stripped to a driver made elsewhere, and streams need one "
@@ -177,9 +178,9 @@ Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, con
         return Error{ErrorCode::unsuitable, "The mesh's faces use none of the driver's vertices, and these do not "
                                             "stand behind the mesh's own; the profile lossless takes such a model."};
     const Mesh source = level_mesh(model, model.finest_level());
-    CodedModel coded;
-    MeshCodeReport report;
-    Result<CodedMesh> mesh = encode_mesh(source, options, &report, context);
+    PackedModel coded;
+    PackedMeshReport report;
+    Result<PackedMesh> mesh = pack_mesh(source, options, &report, context);
     if (!mesh) return mesh.error();
     coded.mesh = std::move(*mesh);
     if (options.levels) coded.levels = levels_of(coded.mesh, source, context);
@@ -210,7 +211,7 @@ Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, con
                               coded.mesh.order.size(),
                               coded.driver.size() + sizeof(Vec3f) * coded.driver_positions.size()}};
     if (!poses.empty()) code_clips(model, options.levels ? with_gradients(model, poses, context) : poses, coded);
-    for (const CodedLevel& level : coded.mesh.levels.levels) {
+    for (const PackedLevel& level : coded.mesh.levels.levels) {
         coded.report.bytes.levels += level.splits.size();
         coded.report.bytes.refinements += level.refinement.size();
     }
@@ -221,11 +222,11 @@ Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, con
     return coded;
 }
 
-void write_model_code(SectionWriter& out, const CodedModel& coded) {
+void write_model_code(SectionWriter& out, const PackedModel& coded) {
     out.value("cd.rev", coded.mesh.levels.attributes.empty() ? kCodeRevision : kRevisionWithAttributes);
     out.value("cd.par", coded.code);
     out.array("cd.stm", coded.levels);
-    const CodedLevels& levels = coded.mesh.levels;
+    const PackedLevels& levels = coded.mesh.levels;
     if (!coded.levels.empty()) { // what is wanted first comes first
         out.bytes("cd.bcon", levels.connectivity, 0);
         out.bytes("cd.bpos", levels.places, 0);
@@ -241,8 +242,8 @@ void write_model_code(SectionWriter& out, const CodedModel& coded) {
     for (std::uint32_t k = 0; k < levels.levels.size(); ++k) out.bytes("cd.lev", levels.levels[k].splits, k + 1);
 }
 
-void write_end_of_code(SectionWriter& out, const CodedModel& coded) {
-    const CodedLevels& levels = coded.mesh.levels;
+void write_end_of_code(SectionWriter& out, const PackedModel& coded) {
+    const PackedLevels& levels = coded.mesh.levels;
     for (std::uint32_t k = 0; k < levels.levels.size(); ++k)
         if (!levels.levels[k].refinement.empty()) out.bytes("cd.ref", levels.levels[k].refinement, k + 1);
     out.bytes("cd.con", coded.mesh.connectivity, 0);
@@ -311,7 +312,7 @@ PoseSequence read_clips(const SectionReader& in) {
     return poses;
 }
 
-CodedMesh coded_outline(const SectionReader& in, const FileCode& code) {
+PackedMesh coded_outline(const SectionReader& in, const FileCode& code) {
     return {.vertices = code.vertices,
             .faces = code.faces,
             .corners = code.corners,
@@ -320,9 +321,9 @@ CodedMesh coded_outline(const SectionReader& in, const FileCode& code) {
             .options = {code.bits, code.surface != 0, code.keep_order != 0, in.count("cd.stm").first > 0}};
 }
 
-Coding coding_of(const SectionReader& in, const FileCode& code) {
+Packing coding_of(const SectionReader& in, const FileCode& code) {
     const std::vector<FileLevel> table = in.array<FileLevel>("cd.stm");
-    std::vector<CodedLevelMark> levels;
+    std::vector<PackedLevelMark> levels;
     std::uint64_t level_bytes = in.item_count<char>("cd.bcon") + in.item_count<char>("cd.bpos"), refinements = 0;
     std::uint64_t clips = 0;
     const std::uint64_t attributes = in.item_count<char>("cd.att") + in.item_count<char>("cd.batt");
@@ -345,9 +346,9 @@ Coding coding_of(const SectionReader& in, const FileCode& code) {
             .levels = std::move(levels)};
 }
 
-CodedLevels read_levels(const SectionReader& in) {
+PackedLevels read_levels(const SectionReader& in) {
     const std::vector<FileLevel> table = in.array<FileLevel>("cd.stm");
-    CodedLevels levels;
+    PackedLevels levels;
     if (table.empty()) return levels;
     if (table.size() > 64) throw FileDamage{"has more levels than make sense"};
     levels.vertices = table[0].vertices;
@@ -367,14 +368,14 @@ CodedLevels read_levels(const SectionReader& in) {
 Model read_model_code(const SectionReader& in, Mesh rest, const RunContext& context) {
     const FileCode code = read_file_code(in);
     in.require_room(unpacked_bytes(code) + double(rest.scalars.size()) * double(code.vertices) * sizeof(float));
-    CodedMesh coded = coded_outline(in, code);
+    PackedMesh coded = coded_outline(in, code);
     coded.connectivity = frames_of(in, "cd.con");
     coded.places = frames_of(in, "cd.pos");
     coded.attributes = frames_of(in, "cd.att");
     coded.order = frames_of(in, "cd.ord");
     coded.levels = read_levels(in);
     coded.rest = std::move(rest);
-    Result<Mesh> mesh = decode_mesh(coded, context);
+    Result<Mesh> mesh = unpack_mesh(coded, context);
     if (!mesh && mesh.error().code == ErrorCode::cancelled) throw mesh.error();
     if (!mesh) throw FileDamage{"holds a coded mesh that is damaged", "pack it again"};
     if (is_made_elsewhere(in)) return bind_elsewhere(in, std::move(*mesh), code, context);

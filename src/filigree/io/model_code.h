@@ -2,9 +2,9 @@
 #pragma once
 
 #include "filigree/coding/mesh_code.h"
-#include "filigree/hierarchy/model.h"
 #include "filigree/io/model_file.h"
 #include "filigree/io/model_sections.h"
+#include "filigree/strip.h"
 
 namespace filigree {
 
@@ -40,8 +40,8 @@ struct FileClip {
 /// The bytes of the poses once they are read.
 double unpacked_bytes(const FileClip& clip, const FileCode& code);
 
-struct CodedModel {
-    CodedMesh mesh;
+struct PackedModel {
+    PackedMesh mesh;
     FileCode code{};
     std::vector<FileLevel> levels; ///< of a stream
     std::string driver;
@@ -49,24 +49,24 @@ struct CodedModel {
     FileClip clip{};
     double frames_per_second = 0;
     std::vector<std::string> clips; ///< blocks
-    CodingReport report;
+    PackReport report;
 };
 
-/// Errors: as write_coded_model.
-Result<CodedModel> code_model(const Model& model, const PoseSequence& poses, const MeshCodeOptions& options,
-                              const RunContext& context);
+/// Errors: as pack_model.
+Result<PackedModel> code_model(const Model& model, const PoseSequence& poses, const PackOptions& options,
+                               const RunContext& context);
 /// All but pictures and what comes behind them: refinements, and what all of a stream needs. Each refers to `coded`,
 /// which has to outlive the writer.
-void write_model_code(SectionWriter& out, const CodedModel& coded);
-void write_end_of_code(SectionWriter& out, const CodedModel& coded);
+void write_model_code(SectionWriter& out, const PackedModel& coded);
+void write_end_of_code(SectionWriter& out, const PackedModel& coded);
 
 bool is_coded(const SectionReader& in);
 /// Whether the driver of a coded file has vertices of its own (strip --driver).
 bool is_made_elsewhere(const SectionReader& in);
 FileCode read_file_code(const SectionReader& in);
 /// The coded mesh without its streams.
-CodedMesh coded_outline(const SectionReader& in, const FileCode& code);
-Coding coding_of(const SectionReader& in, const FileCode& code);
+PackedMesh coded_outline(const SectionReader& in, const FileCode& code);
+Packing coding_of(const SectionReader& in, const FileCode& code);
 /// How many poses, and whether with gradients.
 FileClip clip_of(const SectionReader& in);
 /// The poses; none where there are none. Throws FileDamage.

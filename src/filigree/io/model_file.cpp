@@ -1,5 +1,7 @@
 #include "filigree/io/model_file.h"
 
+#include "filigree/hierarchy/blend_code.h"
+#include "filigree/io/file.h"
 #include "filigree/io/mesh_sections.h"
 #include "filigree/io/model_code.h"
 #include "filigree/io/model_records.h"
@@ -167,8 +169,8 @@ void read_frames(const SectionReader& in, ModelOutline& outline) {
 }
 
 /// What sections of so many bytes are parts of.
-CodedBytes lossless_parts(const std::vector<std::pair<std::string, std::uint64_t>>& sizes) {
-    CodedBytes parts;
+PackedBytes lossless_parts(const std::vector<std::pair<std::string, std::uint64_t>>& sizes) {
+    PackedBytes parts;
     for (const auto& [name, bytes] : sizes) {
         const auto is_one_of = [&](std::initializer_list<std::string_view> names) {
             return std::ranges::any_of(names, [&](std::string_view start) { return name.starts_with(start); });
@@ -346,12 +348,12 @@ Status write_model(const Model& model, const PoseSequence& poses, const std::fil
     }
 }
 
-Result<CodingReport> write_coded_model(const Model& model, const PoseSequence& poses, const MeshCodeOptions& options,
-                                       const std::filesystem::path& path, const RunContext& context) {
+Result<PackReport> pack_model(const Model& model, const PoseSequence& poses, const PackOptions& options,
+                              const std::filesystem::path& path, const RunContext& context) {
     if (const Status fits = check_fits(poses, model, path); !fits) return fits.error();
     context.report("code", 0);
     try {
-        Result<CodedModel> coded = code_model(model, poses, options, context);
+        Result<PackedModel> coded = code_model(model, poses, options, context);
         if (!coded) return coded.error();
         context.report("code", 1);
         SectionWriter out;
@@ -373,8 +375,8 @@ Result<CodingReport> write_coded_model(const Model& model, const PoseSequence& p
     }
 }
 
-Result<LosslessReport> write_lossless_model(const Model& model, const PoseSequence& poses,
-                                            const std::filesystem::path& path, const RunContext& context) {
+Result<LosslessPackReport> pack_model_lossless(const Model& model, const PoseSequence& poses,
+                                               const std::filesystem::path& path, const RunContext& context) {
     if (const Status fits = check_fits(poses, model, path); !fits) return fits.error();
     context.report("code", 0);
     try {
@@ -412,7 +414,7 @@ Result<LosslessReport> write_lossless_model(const Model& model, const PoseSequen
         if (const Status status = write_file(path, file); !status) return status.error();
         std::uint64_t plain_bytes = 0;
         for (const std::string_view piece : plain.finish()) plain_bytes += piece.size();
-        return LosslessReport{lossless_parts(sizes), plain_bytes};
+        return LosslessPackReport{lossless_parts(sizes), plain_bytes};
     } catch (const std::bad_alloc&) {
         return Error{ErrorCode::out_of_memory, path.string() + ": not enough memory for the file's bytes."};
     }

@@ -5,7 +5,7 @@
 
 #include "filigree/io/file.h"
 #include "filigree/io/lossless_sections.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 #include <algorithm>
 #include <bit>

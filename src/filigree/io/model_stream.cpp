@@ -1,7 +1,9 @@
-#include "filigree/io/model_stream.h"
+#include "filigree/pack.h"
 
 #include "filigree/coding/face_code.h"
+#include "filigree/coding/mesh_code.h"
 #include "filigree/coding/mesh_levels.h"
+#include "filigree/io/file.h"
 #include "filigree/io/mesh_sections.h"
 #include "filigree/io/model_code.h"
 
@@ -19,7 +21,7 @@ public:
 
     std::string name, bytes; ///< of the file, from its beginning
     std::uint64_t most_bytes;
-    CodedMesh outline; ///< box and steps, without streams
+    PackedMesh outline; ///< box and steps, without streams
     std::vector<FileLevel> table;
     std::vector<std::uint64_t> ends; ///< of the file, when each entry of the table is whole
     std::optional<LevelReader> reader;
@@ -59,7 +61,7 @@ private:
         const LevelCodeOptions options = level_options(outline.options);
         reader.emplace(options.steps, options.is_refined, most_triangles(code.corners));
         table = in.array<FileLevel>("cd.stm");
-        for (const CodedLevelMark& mark : coding_of(in, code).levels) ends.push_back(mark.bytes);
+        for (const PackedLevelMark& mark : coding_of(in, code).levels) ends.push_back(mark.bytes);
         for (std::size_t k = 1; k < ends.size(); ++k)
             if (ends[k] < ends[k - 1]) throw FileDamage{"has its levels in a wrong order"};
         return true;

@@ -1,7 +1,6 @@
 #include "filigree/io/point_cache.h"
+#include "filigree/file.h"
 #include "filigree/io/extension.h"
-#include "filigree/io/gltf_morph_export.h"
-#include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
 #include "filigree/io/numbered_name.h"
 #include "filigree/io/point_cache_formats.h"

@@ -3,6 +3,7 @@
 #include "filigree/io/file.h"
 #include "filigree/io/file_descriptor.h"
 #include "filigree/io/file_error.h"
+#include "filigree/io/point_cache.h"
 #include "filigree/io/point_cache_formats.h"
 #include "filigree/io/shared_work.h"
 #include "filigree/io/temporary_file.h"

@@ -1,10 +1,11 @@
 // Numbered meshes: NAME_0001.ply, NAME_0002.ply and so on, a mesh a frame.
+#include "filigree/file.h"
 #include "filigree/hierarchy/pose_mesh.h"
 #include "filigree/io/file_batch.h"
 #include "filigree/io/file_error.h"
-#include "filigree/io/mesh_file.h"
 #include "filigree/io/new_folders.h"
 #include "filigree/io/numbered_name.h"
+#include "filigree/io/point_cache.h"
 #include "filigree/io/point_cache_formats.h"
 #include "filigree/io/pose_match.h"
 #include "filigree/io/text_scanner.h"

@@ -2,10 +2,9 @@
 // another axis that is up.
 #pragma once
 
-#include "filigree/core/result.h"
-#include "filigree/core/types.h"
-#include "filigree/core/view.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
+#include "filigree/result.h"
+#include "filigree/types.h"
 
 #include <filesystem>
 #include <optional>

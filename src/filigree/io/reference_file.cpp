@@ -1,5 +1,6 @@
 #include "filigree/io/reference_file.h"
 
+#include "filigree/io/file.h"
 #include "filigree/io/mesh_sections.h"
 #include "filigree/io/model_code.h"
 

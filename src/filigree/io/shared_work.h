@@ -1,8 +1,8 @@
 // Works that processes share which know nothing of each other, on one machine or many: parts gather in a folder.
 #pragma once
 
-#include "filigree/core/result.h"
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
+#include "filigree/result.h"
 
 #include <cstddef>
 #include <filesystem>

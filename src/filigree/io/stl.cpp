@@ -2,7 +2,7 @@
 #include "filigree/io/mesh_formats.h"
 #include "filigree/io/text_scanner.h"
 #include "filigree/io/text_writer.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/weld.h"
 
 #include <bit>

@@ -1,7 +1,7 @@
 // Text of numbers, the shortest that reads back to the same, in every locale.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <algorithm>
 #include <array>

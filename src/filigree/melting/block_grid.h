@@ -1,7 +1,7 @@
 // An endless regular grid, of which blocks of 8 x 8 x 8 nodes are kept where something is.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <array>
 #include <cstdint>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/melting/particle_field.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 namespace filigree {
 

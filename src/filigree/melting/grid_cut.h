@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/melting/block_grid.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 #include <unordered_map>
 

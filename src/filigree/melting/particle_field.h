@@ -1,7 +1,7 @@
 // The matter of particles as a field: smooth, above 0 inside, and of the particles' volume.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/melting/block_grid.h"
 #include "filigree/physics/simulation.h"
 

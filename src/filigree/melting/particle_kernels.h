@@ -1,7 +1,7 @@
 // The kernels that a particle field is a sum of.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/physics/simulation.h"
 
 #include <array>

@@ -1,7 +1,7 @@
 // The closest point on a set of triangles, exactly, many times.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 #include <memory>
 

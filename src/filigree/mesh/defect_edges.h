@@ -1,7 +1,7 @@
 // Where a mesh is not a closed, oriented manifold, edge by edge: for marking what TopologyReport counts.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 namespace filigree {
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "filigree/core/lists.h"
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <algorithm>
 #include <span>

@@ -1,7 +1,7 @@
 // One surface that many others are measured against.
 #pragma once
 
-#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh.h"
 
 #include <memory>
 

@@ -1,5 +1,5 @@
 // Based on: [Sterbenz 1974], when the difference of two floating-point numbers is exact (split_origin).
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,10 @@
-#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/measured_surface.h"
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/random.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/triangulate.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,7 +1,7 @@
 // Places as numbers: places with numbers near each other are near in space [Morton 1966].
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <algorithm>
 #include <array>

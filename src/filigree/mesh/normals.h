@@ -1,8 +1,8 @@
 // Normals from positions: of faces, weighted by area, and of vertices.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 
 #include <Eigen/Geometry>
 

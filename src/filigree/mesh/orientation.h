@@ -1,7 +1,7 @@
 // Turning triangles so that neighbours run the same way round.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 #include <cstdint>
 

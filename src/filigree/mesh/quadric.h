@@ -1,7 +1,7 @@
 // Squared distances from planes, added up [Garland and Heckbert 1997].
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <algorithm>
 

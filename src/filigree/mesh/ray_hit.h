@@ -1,8 +1,8 @@
 // Which triangle a ray meets first.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 
 #include <optional>
 

@@ -2,7 +2,7 @@
 // [Taubin 2002] Detecting and reconstructing subdivision connectivity: a mesh is subdivided when its faces can be
 // gathered around every second vertex. We do it for quads, where what one face keeps decides for its whole component,
 // so that one pass follows all four guesses.
-#include "filigree/mesh/regular_patches.h"
+#include "filigree/mesh.h"
 
 #include "filigree/mesh/edges.h"
 

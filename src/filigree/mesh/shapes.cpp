@@ -1,7 +1,7 @@
 // Based on:
 //   the report, eq. 2.1 (the wavy cube)
 //   [Shirley 1997] (the cylinder's caps; we use their map for the whole cross-section)
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 
 #include <algorithm>
 #include <cmath>

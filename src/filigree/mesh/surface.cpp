@@ -1,6 +1,6 @@
 #include "filigree/mesh/surface.h"
 
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/weld.h"
 
 namespace filigree {

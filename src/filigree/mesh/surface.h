@@ -1,8 +1,8 @@
 // A mesh as algorithms see it: one vertex a place, triangles alone, and none that repeats a vertex.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 
 namespace filigree {
 

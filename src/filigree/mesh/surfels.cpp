@@ -1,8 +1,8 @@
 #include "filigree/mesh/surfels.h"
 
 #include "filigree/core/text.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
-#include "filigree/mesh/triangulate.h"
 
 #include <algorithm>
 #include <array>

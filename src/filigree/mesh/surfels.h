@@ -1,8 +1,8 @@
 // A surface as oriented discs that overlap, without edges: surfels [Pfister et al. 2000].
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 
 #include <optional>
 

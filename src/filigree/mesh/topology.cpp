@@ -1,6 +1,6 @@
 // Every edge is met from its lower vertex: the corners of a vertex, sorted by the neighbours they lead to, show its
 // edges side by side, and joined over those edges, its fans. So one pass over vertices, in parallel, finds it all.
-#include "filigree/mesh/topology.h"
+#include "filigree/mesh.h"
 
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"

@@ -1,7 +1,7 @@
 // The point of one triangle that is closest to another point.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 namespace filigree {
 

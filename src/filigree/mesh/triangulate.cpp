@@ -1,7 +1,7 @@
 // Based on:
 //   [Meisters 1975] (ear clipping). Corners that lie on one another (the bridge to a hole) do not block an ear, so
 //   outlines with bridged holes work too.
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 
 #include "filigree/mesh/edges.h"
 #include "filigree/mesh/normals.h"

@@ -1,8 +1,8 @@
 // Which axis of a mesh points up.
 #pragma once
 
-#include "filigree/core/view.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
+#include "filigree/types.h"
 
 #include <string_view>
 

@@ -1,7 +1,7 @@
 // The order of triangles that makes drawing fast.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 namespace filigree {
 

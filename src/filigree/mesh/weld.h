@@ -1,7 +1,7 @@
 // Vertices at the same place, made one.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 namespace filigree {
 

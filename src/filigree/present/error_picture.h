@@ -1,9 +1,9 @@
 // Errors at a mesh's vertices as colours, and as a picture of their own.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/hierarchy/pose_error.h"
+#include "filigree/context.h"
 #include "filigree/render.h"
+#include "filigree/restore.h"
 
 #include <string>
 

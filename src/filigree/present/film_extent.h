@@ -1,8 +1,8 @@
 // What a film shows over its whole length, so that one camera and one ground hold for all of it.
 #pragma once
 
-#include "filigree/core/view.h"
 #include "filigree/render.h"
+#include "filigree/types.h"
 
 #include <optional>
 #include <span>

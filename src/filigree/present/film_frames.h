@@ -1,9 +1,9 @@
 // The loop of every film: frames drawn one after the other, each written as it is there.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/hierarchy/model.h"
+#include "filigree/context.h"
 #include "filigree/render.h"
+#include "filigree/strip.h"
 
 #include <functional>
 #include <span>

@@ -1,6 +1,6 @@
 #include "filigree/present/level_shape.h"
 
-#include "filigree/mesh/mesh_distance.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/ray_hit.h"
 
 #include <algorithm>

@@ -1,10 +1,10 @@
 // A level of a model as a shape that can be picked, and what its levels cost and lose in a picture.
 #pragma once
 
-#include "filigree/hierarchy/restore.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 #include "filigree/render.h"
 #include "filigree/render/level_choice.h"
+#include "filigree/restore.h"
 
 #include <memory>
 #include <optional>

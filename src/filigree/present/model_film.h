@@ -1,10 +1,10 @@
 // A film of one model: its motion, or once around it.
 #pragma once
 
-#include "filigree/hierarchy/pose.h"
-#include "filigree/hierarchy/restore.h"
 #include "filigree/render.h"
+#include "filigree/restore.h"
 #include "filigree/scene/dropped_body.h"
+#include "filigree/strip.h"
 
 #include <memory>
 #include <optional>

@@ -1,7 +1,7 @@
 // A colour for every patch of regular quads, other than those of its neighbours.
 #pragma once
 
-#include "filigree/mesh/regular_patches.h"
+#include "filigree/mesh.h"
 
 namespace filigree {
 

@@ -2,7 +2,7 @@
 // dark.
 #pragma once
 
-#include "filigree/mesh/regular_patches.h"
+#include "filigree/mesh.h"
 #include "filigree/render.h"
 
 namespace filigree {

@@ -1,8 +1,8 @@
 // The finest level of a model, its patches of regular quads in colours.
 #pragma once
 
-#include "filigree/hierarchy/model.h"
 #include "filigree/render.h"
+#include "filigree/strip.h"
 
 #include <cstdint>
 #include <memory>

@@ -1,9 +1,9 @@
 #include "filigree/present/scene_film.h"
 
-#include "filigree/hierarchy/restore.h"
 #include "filigree/present/film_frames.h"
 #include "filigree/present/textured_look.h"
 #include "filigree/render/surface_materials.h"
+#include "filigree/restore.h"
 #include "filigree/scene/melting_surface.h"
 
 #include <algorithm>

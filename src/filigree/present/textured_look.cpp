@@ -3,7 +3,7 @@
 #include "filigree/core/srgb.h"
 #include "filigree/io/file.h"
 #include "filigree/io/material_file.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 #include "filigree/render/surface_materials.h"
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // What is seen of a textured mesh, place by place.
 #pragma once
 
-#include "filigree/core/result.h"
 #include "filigree/render.h"
+#include "filigree/result.h"
 #include "filigree/scene/body_look.h"
 #include "filigree/scene/world_setup.h"
 

@@ -1,19 +1,13 @@
 // What happens to detail height when its surroundings change size.
 #pragma once
 
+#include "filigree/reference.h"
+
 #include <array>
 #include <optional>
 #include <string_view>
 
 namespace filigree {
-
-/// The factor s on the height of detail, from a size of its surroundings at rest and now.
-enum class HeightLaw {
-    keep,         ///< s = 1
-    inverse,      ///< s = old width / new width (the report, eq. 2.14)
-    proportional, ///< s = sqrt(new area / old area): exact under uniform scale
-    volume,       ///< s = old area / new area
-};
 
 /// `inverse` and `volume` are held in [1 / kMaxHeightScale, kMaxHeightScale]: without it they have no bound as the
 /// surroundings collapse (260 diagonals were measured). `proportional` needs none: it shrinks with its surroundings.

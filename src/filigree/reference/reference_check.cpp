@@ -1,5 +1,6 @@
 #include "filigree/reference/reference_plan.h"
 
+#include "filigree/reference/reference_code.h"
 #include <algorithm>
 #include <cmath>
 

@@ -1,6 +1,7 @@
-#include "filigree/reference/reference_model.h"
+#include "filigree/reference.h"
 
 #include "filigree/mesh/normals.h"
+#include "filigree/reference/reference_code.h"
 
 namespace filigree {
 

@@ -1,7 +1,7 @@
 // Triangles paired to quads: the patches, and where each of their points lies on the triangles.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/remesh/surface_map.h"
 
 namespace filigree {

@@ -1,7 +1,7 @@
 // A fine triangle surface made coarse and even, through changes that are all recorded.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/remesh/surface_map.h"
 
 namespace filigree {

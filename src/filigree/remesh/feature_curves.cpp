@@ -2,6 +2,7 @@
 
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/mesh/edges.h"
+#include "filigree/remesh/manifold_surface.h"
 
 #include <algorithm>
 #include <cmath>

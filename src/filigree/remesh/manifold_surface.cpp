@@ -6,9 +6,9 @@
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/random.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/edges.h"
 #include "filigree/mesh/orientation.h"
-#include "filigree/mesh/triangulate.h"
 #include "filigree/mesh/weld.h"
 
 #include <algorithm>

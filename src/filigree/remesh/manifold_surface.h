@@ -1,8 +1,10 @@
 // What remeshing works on: an oriented triangle manifold that remembers the mesh it came from.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/remesh.h"
+
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 
 #include <vector>
 
@@ -17,31 +19,6 @@ struct ManifoldSurface {
     /// order; kNoIndex three times for triangles that were filled in. Empty when the surface is not the mesh's own (a
     /// wrap).
     std::vector<Triangle> source_corners;
-};
-
-/// What was changed on the way to a manifold.
-struct CleanReport {
-    std::size_t welded_vertices = 0;    ///< vertices at the place of an earlier one
-    std::size_t unused_vertices = 0;    ///< in no triangle
-    std::size_t degenerate_faces = 0;   ///< dropped: triangles that repeat a vertex after welding
-    std::size_t duplicate_faces = 0;    ///< dropped: triangles over the same vertices as an earlier one, and walls
-    std::size_t flipped_faces = 0;      ///< turned, so that neighbours agree; the majority of a component's area stays
-    std::size_t cut_edges = 0;          ///< edges with three or more triangles, or two that cannot agree: left open
-    std::size_t separated_edges = 0;    ///< edges with four or more triangles where the sheets came apart, all closed
-    std::size_t split_vertices = 0;     ///< further copies of vertices whose triangles form more than one fan
-    std::size_t removed_components = 0; ///< see remove_small_components
-    double removed_area = 0;            ///< of those, as a fraction of all
-    std::size_t closed_handles = 0;     ///< see close_handles
-    std::size_t filled_triangles = 0;   ///< that closed them
-};
-
-/// Counts of a manifold surface.
-struct SurfaceTopology {
-    std::size_t components = 0;
-    std::size_t border_edges = 0, border_loops = 0;
-    std::int64_t euler = 0; ///< vertices - edges + triangles
-    /// Handles of all components together: (2 components - border loops - euler) / 2.
-    std::int64_t genus() const { return (2 * std::int64_t(components) - std::int64_t(border_loops) - euler) / 2; }
 };
 
 /// Any mesh as a manifold: triangulates, welds vertices at the same position, drops triangles that repeat a vertex or

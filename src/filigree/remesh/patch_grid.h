@@ -1,7 +1,7 @@
 // The quads themselves: a regular grid of vertices in every patch, on the surface, shared along patch borders.
 #pragma once
 
-#include "filigree/mesh/regular_patches.h"
+#include "filigree/mesh.h"
 #include "filigree/remesh/base_quads.h"
 #include "filigree/remesh/surface_walk.h"
 

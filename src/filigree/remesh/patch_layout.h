@@ -1,7 +1,7 @@
 // How the quads asked for are laid out as patches and levels.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <optional>
 

@@ -1,7 +1,7 @@
 // Why a try at quads failed, and the sentence for it.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <string>
 

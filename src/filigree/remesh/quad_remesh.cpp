@@ -1,17 +1,19 @@
 // Based on: [Lee 1998] (the parametrisation), and docs/remesh.md, which says where we differ and what was measured.
-#include "filigree/remesh/quad_remesh.h"
+#include "filigree/remesh.h"
 
 #include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/edges.h"
-#include "filigree/mesh/mesh_distance.h"
 #include "filigree/remesh/base_triangles.h"
 #include "filigree/remesh/feature_curves.h"
+#include "filigree/remesh/manifold_surface.h"
 #include "filigree/remesh/patch_layout.h"
 #include "filigree/remesh/quad_failure.h"
 #include "filigree/remesh/relax.h"
 #include "filigree/remesh/tips.h"
+#include "filigree/remesh/transfer_attributes.h"
 #include "filigree/remesh/voxel_wrap.h"
 
 #include <algorithm>

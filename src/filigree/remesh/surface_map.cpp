@@ -3,6 +3,7 @@
 // them.
 #include "filigree/remesh/surface_map.h"
 
+#include "filigree/remesh/manifold_surface.h"
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -1,6 +1,7 @@
 // Moving points over a surface: to the closest place that can be reached from where they are.
 #pragma once
 
+#include "filigree/remesh/manifold_surface.h"
 #include "filigree/remesh/surface_map.h"
 
 namespace filigree {

@@ -1,5 +1,6 @@
 #include "filigree/remesh/tips.h"
 
+#include "filigree/remesh/manifold_surface.h"
 #include <algorithm>
 #include <queue>
 #include <unordered_map>

@@ -1,6 +1,7 @@
 // Tips of thin parts: where the surface sticks out of the quads, and a vertex of the grid held at each.
 #pragma once
 
+#include "filigree/remesh/manifold_surface.h"
 #include "filigree/remesh/patch_grid.h"
 
 namespace filigree {

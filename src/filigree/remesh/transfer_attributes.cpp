@@ -2,9 +2,9 @@
 
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/edges.h"
-#include "filigree/mesh/triangulate.h"
 #include "filigree/mesh/weld.h"
 
 #include <algorithm>

@@ -1,19 +1,14 @@
 // UVs, colours, normals, labels and further numbers, carried from a mesh to another that lies on it.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/remesh.h"
+
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 
 #include <vector>
 
 namespace filigree {
-
-/// A point of a mesh's surface: barycentric coordinates over three of its corners (indices into Mesh::corners, all of
-/// one face).
-struct CornerPoint {
-    Triangle corners = {kNoIndex, kNoIndex, kNoIndex};
-    Vec3f barycentric = Vec3f::Zero();
-};
 
 /// Gives `to` the attributes of `from`. points: for each vertex of `to` where it lies on `from`.
 /// Colours and scalars are interpolated; labels and smoothing groups are those of the face under each face's centre.

@@ -1,9 +1,9 @@
 // A set of voxels, and the border between those and the rest.
 #pragma once
 
+#include "filigree/context.h"
 #include "filigree/core/bits.h"
-#include "filigree/core/run_context.h"
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <array>
 #include <span>

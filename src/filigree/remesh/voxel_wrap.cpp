@@ -9,6 +9,7 @@
 #include "filigree/core/lists.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/closest_point.h"
+#include "filigree/remesh/manifold_surface.h"
 #include "filigree/remesh/voxel_grid.h"
 
 #include <algorithm>

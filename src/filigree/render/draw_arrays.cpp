@@ -1,7 +1,7 @@
 #include "filigree/render/draw_arrays.h"
 
 #include "filigree/core/parallel_for.h"
-#include "filigree/mesh/triangulate.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/weld.h"
 
 #include <algorithm>

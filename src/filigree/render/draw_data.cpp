@@ -1,5 +1,6 @@
 // The processor's half of drawables: nothing here calls OpenGL.
 #include "filigree/core/parallel_for.h"
+#include "filigree/hierarchy/blend_code.h"
 #include "filigree/mesh/vertex_cache.h"
 #include "filigree/render/drawable_content.h"
 #include "filigree/render/octahedron.h"

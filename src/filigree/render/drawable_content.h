@@ -1,6 +1,7 @@
 // What DrawData and Drawable hold, for the renderer. Only for this layer's own sources.
 #pragma once
 
+#include "filigree/hierarchy/blend_code.h"
 #include "filigree/render/draw_arrays.h"
 #include "filigree/render/gl_objects.h"
 #include "filigree/render/gpu_restore.h"

@@ -1,7 +1,7 @@
 // OpenGL objects that give themselves back. Only for this layer's own sources: everything else need not know OpenGL.
 #pragma once
 
-#include "filigree/core/result.h"
+#include "filigree/result.h"
 
 #include <epoxy/gl.h>
 

@@ -1,5 +1,6 @@
 #include "filigree/render/gpu_restore.h"
 
+#include "filigree/hierarchy/blend_code.h"
 #include "filigree/hierarchy/blend_kernel.h"
 #include "filigree/render/gl_objects.h"
 #include "filigree/render/octahedron.h"

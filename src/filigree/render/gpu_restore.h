@@ -2,8 +2,8 @@
 // rest.
 #pragma once
 
-#include "filigree/hierarchy/model.h"
-#include "filigree/hierarchy/restore.h"
+#include "filigree/restore.h"
+#include "filigree/strip.h"
 
 #include <memory>
 

@@ -1,7 +1,7 @@
 // Where light comes from in a picture, pass by pass, and how a box is seen from there.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <array>
 

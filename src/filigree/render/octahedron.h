@@ -1,7 +1,7 @@
 // Directions in 32 bits, as the shaders unpack them.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <cmath>
 #include <cstdint>

@@ -1,7 +1,7 @@
 // The box of a posed model, without restoring it.
 #pragma once
 
-#include "filigree/hierarchy/model.h"
+#include "filigree/strip.h"
 
 namespace filigree {
 

@@ -1,7 +1,7 @@
 // What closes a mesh: cones over its open edges.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 namespace filigree {
 

@@ -1,7 +1,7 @@
 // How a mesh closes: whether it has an inside that crossings can tell.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/mesh/surface.h"
 #include "filigree/sample/outward.h"
 

@@ -1,8 +1,8 @@
 // The report's lattice (2.2): points in a view frustum.
 #pragma once
 
-#include "filigree/core/result.h"
-#include "filigree/core/types.h"
+#include "filigree/result.h"
+#include "filigree/types.h"
 
 #include <array>
 #include <optional>

@@ -1,8 +1,8 @@
 // Inside or not by the parity of crossings from an eye: the report's way (2.2), made exact.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 #include "filigree/sample/exact_sign.h"
 
 #include <memory>

@@ -6,7 +6,7 @@
 // bodies that share a face share no point and miss none.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/sample.h"
 #include "filigree/sample/exact_sign.h"
 

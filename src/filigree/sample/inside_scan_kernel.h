@@ -2,7 +2,7 @@
 // eight at a time.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 #include "filigree/sample/exact_sign.h"
 
 #include <atomic>

@@ -1,7 +1,7 @@
 // Which parts of a surface lie inside which others.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 namespace filigree {
 

@@ -2,8 +2,8 @@
 // once.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/core/types.h"
+#include "filigree/context.h"
+#include "filigree/types.h"
 
 #include <algorithm>
 #include <array>

@@ -1,8 +1,8 @@
 // Generalised winding numbers of points [Jacobson et al. 2013]: how often triangles go round a point, open or not.
 #pragma once
 
-#include "filigree/core/run_context.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/context.h"
+#include "filigree/mesh.h"
 
 #include <memory>
 

@@ -2,8 +2,8 @@
 // error to expect.
 #pragma once
 
-#include "filigree/hierarchy/strip.h"
 #include "filigree/physics/body.h"
+#include "filigree/strip.h"
 
 #include <string>
 

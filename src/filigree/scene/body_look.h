@@ -1,7 +1,7 @@
 // How a body looks that has materials and textures, so that what melts of it looks alike.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 #include <span>
 #include <vector>

@@ -1,9 +1,9 @@
 // A dropped body in motion, moment by moment.
 #pragma once
 
-#include "filigree/hierarchy/pose.h"
 #include "filigree/physics/simulation.h"
 #include "filigree/scene/dropped_body.h"
+#include "filigree/strip.h"
 
 #include <optional>
 #include <string>

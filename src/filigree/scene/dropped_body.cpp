@@ -1,6 +1,6 @@
 #include "filigree/scene/dropped_body.h"
 
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/body/own_weight.h"
 #include "filigree/scene/particles_near.h"
 

@@ -1,6 +1,6 @@
 #include "filigree/scene/finer_check.h"
 
-#include "filigree/hierarchy/restore.h"
+#include "filigree/restore.h"
 
 #include <algorithm>
 #include <cmath>

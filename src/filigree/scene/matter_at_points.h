@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/core/parallel_for.h"
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 #include <array>
 #include <span>

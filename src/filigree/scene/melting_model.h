@@ -1,9 +1,9 @@
 // One model that melts, in model units: its surface, and how warm that is, moment by moment.
 #pragma once
 
-#include "filigree/hierarchy/restore.h"
 #include "filigree/melting/composite_surface.h"
 #include "filigree/physics/body.h"
+#include "filigree/restore.h"
 #include "filigree/scene/body_look.h"
 #include "filigree/scene/matter_at_points.h"
 

@@ -1,6 +1,7 @@
 #include "filigree/scene/melting_surface.h"
 
 #include "filigree/core/parallel_for.h"
+#include "filigree/hierarchy/blend_code.h"
 #include "filigree/mesh/normals.h"
 
 #include <algorithm>

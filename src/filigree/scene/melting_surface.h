@@ -1,9 +1,9 @@
 // The bodies of a scene that melt, as one surface that parts and joins.
 #pragma once
 
-#include "filigree/hierarchy/restore.h"
 #include "filigree/melting/composite_surface.h"
 #include "filigree/mesh/surfels.h"
+#include "filigree/restore.h"
 #include "filigree/scene/body_look.h"
 #include "filigree/scene/matter_at_points.h"
 #include "filigree/scene/recording.h"

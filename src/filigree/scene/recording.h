@@ -1,9 +1,9 @@
 // What a simulated scene leaves: the poses frame by frame, and figures about them.
 #pragma once
 
-#include "filigree/hierarchy/pose.h"
 #include "filigree/physics/simulation.h"
 #include "filigree/scene/doubts.h"
+#include "filigree/strip.h"
 
 #include <cstdint>
 #include <optional>

@@ -1,8 +1,8 @@
 #include "filigree/scene/scene_file.h"
 
 #include "filigree/core/random.h"
+#include "filigree/file.h"
 #include "filigree/io/file.h"
-#include "filigree/io/mesh_file.h"
 #include "filigree/io/model_file.h"
 #include "filigree/physics/material.h"
 #include "filigree/scene/scene_table.h"

@@ -2,10 +2,10 @@
 // each with the member that it fills.
 #pragma once
 
-#include "filigree/core/view.h"
 #include "filigree/fracture.h"
-#include "filigree/mesh/shapes.h"
+#include "filigree/mesh.h"
 #include "filigree/physics/simulation.h"
+#include "filigree/types.h"
 
 #include <array>
 #include <optional>

@@ -1,7 +1,7 @@
 // A scene that moves: simulated frame by frame, each body's driver recorded, and what makes the motion doubtful said.
 #pragma once
 
-#include "filigree/hierarchy/restore.h"
+#include "filigree/restore.h"
 #include "filigree/scene/recording.h"
 #include "filigree/scene/world_setup.h"
 

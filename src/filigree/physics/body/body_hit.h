@@ -1,7 +1,7 @@
 // What a stiff elastic body meets while it touches something. Private to the layer.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 namespace filigree {
 

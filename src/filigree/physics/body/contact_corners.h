@@ -2,7 +2,7 @@
 // Contact sees them as it sees the corners of others. Private to the layer.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/physics/body.h"
 
 namespace filigree {

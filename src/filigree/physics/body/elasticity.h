@@ -1,7 +1,7 @@
 // What the stepper asks of a material: forces, energy, gradients.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/physics/body.h"
 
 #include <algorithm>

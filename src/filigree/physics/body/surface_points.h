@@ -1,7 +1,7 @@
 // Points spread evenly over a surface, with the areas they stand for.
 #pragma once
 
-#include "filigree/mesh/mesh.h"
+#include "filigree/mesh.h"
 
 namespace filigree {
 

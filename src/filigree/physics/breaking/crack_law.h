@@ -3,8 +3,8 @@
 #pragma once
 
 #include "filigree/core/random.h"
-#include "filigree/core/types.h"
 #include "filigree/physics/breaking/broken_body.h"
+#include "filigree/types.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/core/bits.h"
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <array>
 #include <cstdint>

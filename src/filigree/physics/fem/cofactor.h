@@ -1,7 +1,7 @@
 // How areas turn. Private to the layer.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 namespace filigree {
 

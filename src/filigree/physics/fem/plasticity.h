@@ -1,9 +1,9 @@
 // What an elastic deformation gradient keeps of itself where the material flows.
 #pragma once
 
-#include "filigree/core/types.h"
 #include "filigree/physics/fem/cofactor.h"
 #include "filigree/physics/material.h"
+#include "filigree/types.h"
 
 #include <algorithm>
 

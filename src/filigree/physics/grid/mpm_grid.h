@@ -2,7 +2,7 @@
 // layer.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/physics/grid/mpm_particle.h"
 
 #include <array>

@@ -6,8 +6,8 @@
 #pragma once
 
 #include "filigree/core/lanes.h"
-#include "filigree/core/types.h"
 #include "filigree/physics/material.h"
+#include "filigree/types.h"
 
 #include <cstdint>
 #include <span>

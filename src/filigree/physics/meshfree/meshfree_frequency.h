@@ -1,7 +1,7 @@
 // How fast a meshfree body can swing. Private to the layer.
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/physics/body.h"
 #include "filigree/physics/meshfree/meshfree_gather.h"
 

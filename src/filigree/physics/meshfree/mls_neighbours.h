@@ -1,7 +1,7 @@
 // Neighbours of free particles and their moving-least-squares weights [Mueller 2004].
 #pragma once
 
-#include "filigree/core/run_context.h"
+#include "filigree/context.h"
 #include "filigree/physics/body.h"
 
 #include <array>

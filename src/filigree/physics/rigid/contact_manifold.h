@@ -1,7 +1,7 @@
 // Few contact points that stand for many. Private to the layer.
 #pragma once
 
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <span>
 #include <vector>

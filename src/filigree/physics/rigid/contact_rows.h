@@ -2,7 +2,7 @@
 #pragma once
 
 #include "filigree/core/lanes.h"
-#include "filigree/core/types.h"
+#include "filigree/types.h"
 
 #include <algorithm>
 #include <cmath>

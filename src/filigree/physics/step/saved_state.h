@@ -1,12 +1,12 @@
 // Everything that moves in a simulation, as one struct and as bytes. Private to the layer.
 #pragma once
 
-#include "filigree/core/result.h"
 #include "filigree/physics/breaking/cracks.h"
 #include "filigree/physics/contact/contact.h"
 #include "filigree/physics/rigid/rigid_pairs.h"
 #include "filigree/physics/step/made_for.h"
 #include "filigree/physics/step/set_motion.h"
+#include "filigree/result.h"
 
 #include <string>
 #include <string_view>

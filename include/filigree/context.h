@@ -1,7 +1,14 @@
-// What long work needs from its caller: progress, cancel, threads, a seed. The library never prints.
+// The context of a long call: threads, progress, cancelling, seed.
+//
+// The default uses all threads and is silent. Make one to see progress, to cancel from another thread, or to limit the
+// threads. Results never depend on the number of threads.
+//
+//     RunContext context(4);
+//     context.progress = [](std::string_view phase, double fraction) { ... };
+//     strip(mesh, {}, context);
 #pragma once
 
-#include "filigree/core/result.h"
+#include "filigree/result.h"
 
 #include <atomic>
 #include <cstdint>
@@ -11,24 +18,24 @@
 
 namespace filigree {
 
-/// Passed by const reference down every long call. Cheap to copy; copies share the cancel flag and the arena.
+/// Passed by const reference to every long call. Cheap to copy; copies share the cancel flag and the threads.
 class RunContext {
 public:
-    /// threads: workers for parallel loops, 0 for all the processor has. No more than the processors we may run on, as
-    /// more would only wait for each other: threads() says how many it became. Results never depend on it.
+    /// threads: for parallel loops; 0: all that the processor has. Never more than the processors this process may use:
+    /// threads() says how many. The library never prints.
     explicit RunContext(unsigned threads = 0);
 
-    /// Called from the calling thread with the phase's name and the fraction done, 0 to 1. Unset: silent.
+    /// Called from the calling thread with the name of the phase and the fraction done, 0 to 1. Unset: silent.
     std::function<void(std::string_view phase, double fraction)> progress;
 
     /// Seed of everything random in the call.
     std::uint64_t seed = 1;
 
     unsigned threads() const { return threads_; }
-    /// Calls work() such that oneTBB inside it, and so Embree, takes no more threads than these.
+    /// Calls work() so that oneTBB inside it, and so Embree, uses no more threads than these.
     void execute(const std::function<void()>& work) const;
 
-    /// Asks the work to stop; safe from any thread and from a signal handler.
+    /// Asks the call to stop: it returns the error `cancelled`. Safe from any thread and from a signal handler.
     void cancel() const { cancelled_->store(true, std::memory_order_relaxed); }
     bool is_cancelled() const { return cancelled_->load(std::memory_order_relaxed); }
 

@@ -1,4 +1,17 @@
-// How things go wrong: a named code and one sentence that says where, why, and what to do.
+// Results and errors: how every call of the library fails.
+//
+// A call that may fail returns Result<T>: a value, or an Error with a code and one sentence. Check it, then take the
+// value:
+//
+//     const Result<MeshFile> file = read_mesh("scan.ply");
+//     if (!file) {
+//         std::cerr << file.error().message << '\n';
+//         return static_cast<int>(file.error().code);
+//     }
+//     const Mesh& mesh = file->mesh;
+//
+// value() of a failed result throws BadResultAccess, whose what() is the same sentence. The library throws nothing else
+// but std::bad_alloc.
 #pragma once
 
 #include <cassert>

@@ -1,4 +1,4 @@
-// The words everything else is written in: indices, vectors, boxes.
+// Indices, vectors, boxes and axes: the types that all other headers use.
 #pragma once
 
 #include <Eigen/Core>
@@ -6,12 +6,13 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 #include <span>
 #include <vector>
 
 namespace filigree {
 
-using Index = std::uint32_t; ///< of a vertex, a face or a corner; see docs/conventions.md
+using Index = std::uint32_t; ///< number of a vertex, a face or a corner
 inline constexpr Index kNoIndex = std::numeric_limits<Index>::max();
 
 using Triangle = std::array<Index, 3>;
@@ -38,7 +39,7 @@ struct Box {
     double diagonal() const { return size().norm(); }
 };
 
-/// The box of `positions`; empty for no positions. Cost O(V).
+/// The bounding box of positions; empty where there are none. Cost O(V).
 inline Box bounds(std::span<const Vec3f> positions) {
     Vec3f lo = Vec3f::Constant(std::numeric_limits<float>::infinity()), hi = -lo;
     for (const Vec3f& p : positions) {
@@ -50,5 +51,19 @@ inline Box bounds(std::span<const Vec3f> positions) {
     box.max = hi.cast<double>();
     return box;
 }
+
+enum class Axis { x, y, z };
+using UpAxis = Axis; ///< the axis that points up
+
+/// Directions to look from. With y up: front looks along -z, side along -x (from the right), top along -y, iso from the
+/// front, right and above. With z up, front looks along +y.
+enum class View { front, side, top, iso };
+
+/// The unit vector of an up axis.
+Vec3d up_vector(UpAxis up);
+constexpr double radians(double degrees) { return degrees * std::numbers::pi / 180; }
+
+/// The unit vector from the object to the viewer.
+Vec3d view_direction(View view, UpAxis up);
 
 } // namespace filigree
