@@ -1,4 +1,4 @@
-// How a body looks that has materials and textures, so that what melts of it looks alike.
+// Look of a body with materials and textures, for the surface of its melt.
 #pragma once
 
 #include "filigree/mesh.h"
@@ -18,8 +18,8 @@ struct BodyLook {
     bool empty() const { return materials.empty(); }
 };
 
-/// A surface of matter as programs draw it that multiply textures with colours: faces with a material have vertices of
-/// their own, of that material's colour here, where other faces had the same.
+/// A surface of matter for programs that multiply textures with vertex colours. A vertex that faces of several
+/// materials share is copied, so that each copy has the colour of one material.
 struct DrawnSurface {
     Mesh mesh;                 ///< the surface's vertices, and copies of some behind them, with all that they have
     std::vector<Index> copied; ///< of each copy: which vertex

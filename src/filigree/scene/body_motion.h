@@ -25,7 +25,7 @@ struct Moment {
     double milliseconds = 0; ///< of the simulation and the driver together
 };
 
-/// What a moment tells that takes longer.
+/// Parts of a moment that cost more time.
 struct MomentWishes {
     bool full = false, temperatures = false;
 };
@@ -49,8 +49,8 @@ public:
     Status set_heat_sources(std::vector<HeatSource> sources);
     /// One frame. Errors: as of Simulation::advance; a cancelled frame is not begun.
     Result<FrameReport> advance(const RunContext& context);
-    /// As it is now; report and milliseconds are left to the caller. Parts of the driver that went nowhere sensible
-    /// stay where the last look saw them. Cost: of a body that melts O(mesh + particles), else O(driver).
+    /// The body as it is now; report and milliseconds are left to the caller. Parts of the driver that went nowhere
+    /// sensible stay where the last look saw them. Cost: of a body that melts O(mesh + particles), else O(driver).
     Moment look(const MomentWishes& wishes);
 
 private:

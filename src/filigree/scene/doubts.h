@@ -1,4 +1,4 @@
-// What makes a run's motion doubtful: noted frame by frame, and told at its end.
+// Reasons to doubt a run's motion: noted in each frame, reported at its end.
 #pragma once
 
 #include "filigree/physics/simulation.h"
@@ -16,10 +16,10 @@ struct SceneFile;
 /// Cells of a body that were inside out at the end of frames.
 struct Inversion {
     std::uint64_t first = 0, last = 0, frames = 0; ///< the first and the last such frame, and how many
-    std::uint64_t worst = 0;                       ///< that with the least volume:
-    std::uint64_t cells = 0;                       ///< so many were inside out,
-    float least = 1;                               ///< the worst had this part of its volume
-    Vec3f place = Vec3f::Zero();                   ///< and was here: world, m
+    std::uint64_t worst = 0;                       ///< the frame with the least volume of a cell
+    std::uint64_t cells = 0;                       ///< inside out in that frame
+    float least = 1;                               ///< that volume, as a part of the volume at rest
+    Vec3f place = Vec3f::Zero();                   ///< of that cell: world, m
 
     void add(std::uint64_t frame, const InvertedCells& cells);
 };
@@ -48,8 +48,8 @@ struct FirstLoss {
     Vec3f place = Vec3f::Zero(); ///< world, m
 };
 
-/// Whether energy comes from nowhere. Nothing is said while something does work on the bodies; from then on what there
-/// is may not be more than what there was.
+/// Watches for energy that comes from nowhere. It begins when nothing but gravity does work on the bodies: from then on
+/// the energy may not grow.
 struct EnergyWatch {
     bool has_begun = false;
     double total = 0, moving = 0; ///< J when it began; moving: kinetic and elastic
@@ -64,9 +64,10 @@ struct EnergyWatch {
     double excess(const Energy& energy, double allowed, double least);
 };
 
-/// s: from when on nothing in the scene does work on its bodies but gravity; infinite: never.
+/// The time, s, from which on only gravity does work on the bodies of a scene; infinite: never.
 double left_alone_from(const SceneFile& scene);
-/// The share by which energy may seem to grow: what contacts hold is not counted, and what breaks gives some back.
+/// The share by which energy may seem to grow: the energy of contacts is not counted, and breaking bonds give some
+/// back.
 double allowed_growth(const SceneFile& scene);
 
 } // namespace filigree

@@ -1,14 +1,14 @@
-// How true a scene's meshes are: the same scene with eight times the particles says where every vertex belongs.
+// Error of a scene's meshes against the same scene with eight times the particles.
 #pragma once
 
 #include "filigree/scene/world_setup.h"
 
 namespace filigree {
 
-/// Distances from the truth, in diagonals of the body at rest.
+/// Distances from the finer simulation, in diagonals of the body at rest.
 struct TruthError {
     double rms = 0;   ///< mean over the frames
-    double worst = 0; ///< vertex
+    double worst = 0; ///< of any vertex in any frame
 };
 
 struct FinerCheck {

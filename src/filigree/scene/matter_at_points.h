@@ -1,4 +1,4 @@
-// What particles say of the points around them: how warm it is there, how far matter is renewed.
+// Particles' values (temperature, renewal) at points between them.
 #pragma once
 
 #include "filigree/core/parallel_for.h"
@@ -10,7 +10,7 @@
 
 namespace filigree {
 
-/// Of each point the four particles nearest to it, and their shares. Never changes once made.
+/// The four nearest particles of each point, and their weights. Never changes once made.
 class MatterAtPoints {
 public:
     MatterAtPoints() = default;
@@ -20,7 +20,8 @@ public:
                    const RunContext& context);
 
     std::size_t size() const { return near_.size(); }
-    /// values: one a particle. nowhere: of a point that has none.
+    /// The weighted mean of the values of its particles. values: one a particle. nowhere: returned where a point has
+    /// no particles.
     template <class T>
     T at(std::size_t point, std::span<const T> values, T nowhere) const {
         const Near& near = near_[point];

@@ -1,4 +1,4 @@
-// One model that melts, in model units: its surface, and how warm that is, moment by moment.
+// Surface and temperatures of one model that melts, moment by moment, in model units.
 #pragma once
 
 #include "filigree/melting/composite_surface.h"
@@ -15,14 +15,14 @@ namespace filigree {
 /// Never changes once made. What a moment is made of is in model units, relative to the model's origin.
 class MeltingModel {
 public:
-    /// body: of the model, `scale` metres a model unit. look: of its mesh; empty: it has colours of its own, or none.
-    /// Errors: unsuitable (the mesh is not closed, or as
-    /// Restorer::create), cancelled. Cost: welding, and O(vertices + particles).
+    /// body: of the model, `scale` metres a model unit. look: of its mesh; empty: the mesh has its own colours, or
+    /// none. Errors: unsuitable (the mesh is not closed), those of Restorer::create, cancelled. Cost: welding, and
+    /// O(vertices + particles).
     static Result<MeltingModel> create(std::shared_ptr<const Model> model, const Body& body, double scale,
                                        const BodyLook& look, const RunContext& context);
 
-    /// The surface of a moment; none while nothing of it is renewed, as the restored mesh is it then. dead: as of
-    /// CompositeMesher::make, of the moments before. Cost O(mesh + particles). Errors: as make's.
+    /// The surface of a moment. None while no matter is renewed: the restored mesh is the surface then. dead: vertices
+    /// that have gone so far (see CompositeMesher::make). Cost O(mesh + particles). Errors: as make's.
     Result<std::optional<Mesh>> surface(const Pose& pose, const MatterParticles& matter,
                                         std::vector<std::uint8_t>& dead, const RunContext& context) const;
     /// K, one a vertex of the model's mesh.

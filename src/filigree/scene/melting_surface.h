@@ -11,10 +11,10 @@
 
 namespace filigree {
 
-/// Of all bodies of mpm together, as what is molten flows together.
+/// One surface of all bodies of mpm: where they melt they flow together.
 class MeltingSurface {
 public:
-    /// Bodies whose mesh is open or not manifold are left out, as ever a mesh of one topology; `warnings` says so.
+    /// Bodies whose mesh is open or not manifold are left out: their meshes keep their topology. `warnings` names them.
     /// ready has to outlive the surface. Cost: welding, and O(vertices). Errors: cancelled.
     static Result<MeltingSurface> create(const ReadyScene& ready, const RunContext& context);
     /// looks: one a body of the scene. Kept parts keep their materials and UVs, and melt has the colours of what it
@@ -40,7 +40,7 @@ public:
     Result<Surfels> surfels(const CompositeSurface& surface, const Recording& recording, std::size_t frame,
                             const RunContext& context) const;
 
-    /// How fast the vertices of a frame that frame() has made go, m/s: as the particles nearest to each, to the next
+    /// Velocity of each vertex of a frame that frame() has made, m/s: that of its nearest particles, up to the next
     /// frame. Errors: cancelled.
     Result<std::vector<Vec3f>> velocities(const CompositeSurface& surface, const Recording& recording,
                                           std::size_t frame, double frames_per_second, const RunContext& context) const;

@@ -1,4 +1,4 @@
-// The particles at a place of a body's surface: what a pin holds, what a force pushes.
+// Particles near points of a body's surface: those that a pin holds or a force pushes.
 #pragma once
 
 #include "filigree/physics/body.h"

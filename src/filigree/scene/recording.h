@@ -1,4 +1,4 @@
-// What a simulated scene leaves: the poses frame by frame, and figures about them.
+// Result of a simulated scene: the poses of each frame, and figures about the run.
 #pragma once
 
 #include "filigree/physics/simulation.h"
@@ -54,12 +54,13 @@ struct Recording {
     EnergyWatch energy;
 };
 
-/// Driver vertices that went nowhere sensible in a frame stay where they were, so that one does not spoil all.
+/// Holds driver vertices whose motion in a frame makes no sense (not finite, or too far) where they were: one such
+/// vertex would spoil the whole mesh.
 /// before, now: poses one after the other, with gradients. far: the longest way that is sensible in a frame, in the
 /// poses' units. most_gradient: the largest norm of a gradient that is. Returns how many were held.
 std::size_t hold_lost(const Pose& before, Pose& now, float far, float most_gradient);
 
-/// Diagonals of the body at rest: further than that nothing sensible goes in a frame.
+/// The longest sensible way of a vertex in a frame, in diagonals of the body at rest.
 inline constexpr double kFarInAFrame = 1e4;
 
 } // namespace filigree

@@ -1,4 +1,4 @@
-// A scene that moves: simulated frame by frame, each body's driver recorded, and what makes the motion doubtful said.
+// Simulation of a scene: it records each body's driver in every frame, and the reasons to doubt the motion.
 #pragma once
 
 #include "filigree/restore.h"
@@ -13,8 +13,8 @@ namespace filigree {
 
 class SceneRun {
 public:
-    /// A run at its start. scene and ready must outlive it and stay where they are. checks: whether every vertex is
-    /// also carried by the particles, and the restored mesh compared with that: dearer. Errors: as of
+    /// A run at its start. scene and ready must outlive it and stay where they are. checks: also carry every vertex by
+    /// the particles, and compare the restored mesh with that (costs more time). Errors: as of
     /// Simulation::create and Restorer::create.
     static Result<SceneRun> create(const SceneFile& scene, const ReadyScene& ready, bool checks,
                                    const RunContext& context);
@@ -34,13 +34,13 @@ public:
     Energy energy() const { return simulation_.energy(always_); }
     /// The body's mesh in one of the recorded poses, at the scene's origin. Errors: as of Restorer::mesh.
     Result<Mesh> mesh(std::size_t body, std::size_t frame, const RunContext& context) const;
-    /// What makes the motion so far doubtful, or other than the scene says: sentences.
+    /// Reasons to doubt the motion so far, and where it differs from what the scene says: sentences.
     std::vector<std::string> warnings() const;
     /// A sentence where what is recorded is not to be trusted: motions were not finite or the driver went nowhere
     /// sensible, cells of fem or springs were inside out at the end of a frame, or energy came from nowhere. warnings()
     /// then say how much, where, and what to change.
     std::optional<std::string> broke_down() const;
-    /// What the user may want to know and need not act on: sentences.
+    /// Facts that need no action: sentences.
     std::vector<std::string> notes() const;
 
 private:
