@@ -408,8 +408,8 @@ TEST_F(SceneRunTest, ParticlesNearAPointAreThoseWithinHalfACellAndTheNearest) {
 TEST(HoldLost, HoldsWhatIsFarOrNoNumber) {
     const float nan = std::numeric_limits<float>::quiet_NaN();
     const std::vector<Mat3f> still(4, Mat3f::Identity());
-    const Pose before{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}}, still, {}};
-    Pose now{{{0.5f, 0, 0}, {100, 0, 0}, {nan, 0, 0}, {3.5f, 0, 0}}, still, {}};
+    const Pose before{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}}, still};
+    Pose now{{{0.5f, 0, 0}, {100, 0, 0}, {nan, 0, 0}, {3.5f, 0, 0}}, still};
     now.gradients[3] = 1000 * Mat3f::Identity();
     EXPECT_EQ(hold_lost(before, now, 10, 100), 3U);
     EXPECT_EQ(now.positions, (std::vector<Vec3f>{{0.5f, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}}));

@@ -1,9 +1,9 @@
 #include "filigree/remesh/feature_curves.h"
 
 #include "filigree/core/disjoint_sets.h"
-#include "filigree/core/view.h"
 #include "filigree/mesh/edges.h"
 #include "filigree/remesh/manifold_surface.h"
+#include "filigree/types.h"
 
 #include <algorithm>
 #include <cmath>
