@@ -24,7 +24,7 @@ struct Attachment {
             refuse("The body that these points went along with was removed.");
     }
     Pose pose() const {
-        Pose pose{std::vector<Vec3f>(count), std::vector<Mat3f>(count), {}};
+        Pose pose{std::vector<Vec3f>(count), std::vector<Mat3f>(count)};
         const RunContext& context = short_context(simulation->threads);
         simulation->alone([&] {
             require();
