@@ -2,6 +2,7 @@
 
 import bpy
 
+
 def _changed(settings, context):
     from . import follow
 
