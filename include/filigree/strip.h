@@ -134,6 +134,8 @@ std::vector<float> vertex_levels(const Model& model, unsigned level);
 /// The first thing wrong with a model, as a sentence, or "" when it is sound: indices are in range, offsets ascend,
 /// there is one record a vertex, numbers are finite. A model that passes can be restored. Cost O(size).
 std::string check_model(const Model& model);
+/// The first thing wrong with a level of a mesh of so many vertices, as a sentence, or "". Cost O(size).
+std::string check_level(const Level& level, std::size_t vertex_count);
 
 // ---------------------------------------------------------------------------------------------------------------------
 // Stripping

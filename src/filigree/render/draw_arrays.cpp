@@ -2,6 +2,7 @@
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh.h"
+#include "filigree/mesh/edges.h"
 #include "filigree/mesh/weld.h"
 
 #include <algorithm>

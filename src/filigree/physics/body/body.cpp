@@ -1,4 +1,5 @@
 #include "filigree/physics/body.h"
+#include "filigree/sample/closure.h"
 
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/parallel_for.h"

@@ -1,4 +1,5 @@
 #include "filigree/physics/body/joined_parts.h"
+#include "filigree/sample/closure.h"
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/text.h"

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/physics/body.h"
+#include "filigree/sample/closure.h"
 
 namespace filigree {
 

@@ -1,6 +1,7 @@
 // From a mesh to cells. Everything here is in model units; only the finished cells are in metres.
 #include "filigree/physics/body/mesh_cells.h"
 #include "filigree/physics/body/make_cells.h"
+#include "filigree/sample/closure.h"
 
 #include "filigree/physics/body/occupied_cells.h"
 

@@ -3,6 +3,7 @@
 
 #include "filigree/physics/body.h"
 #include "filigree/physics/body/make_cells.h"
+#include "filigree/sample/closure.h"
 
 #include <functional>
 

@@ -1,4 +1,6 @@
 #include "filigree/physics/body/occupied_cells.h"
+#include "filigree/sample/closure.h"
+#include "filigree/sample/inside_scan.h"
 
 #include "filigree/core/parallel_for.h"
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "filigree/physics/body.h"
+#include "filigree/sample/closure.h"
 
 #include <optional>
 #include <string>
