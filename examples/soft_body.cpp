@@ -25,7 +25,7 @@ int main() {
     const std::vector<Vec3f> driver = driver_positions(model);
     const std::size_t attachment = simulation.attach(0, driver, context);
     const Restorer restorer = Restorer::create(model, {}, context).value();
-    Pose pose{driver, std::vector<Mat3f>(driver.size()), {}};
+    Pose pose{driver, std::vector<Mat3f>(driver.size())};
     double lowest = 0;
     for (int frame = 0; frame < 60; ++frame) {
         const FrameReport report = simulation.advance(context).value();

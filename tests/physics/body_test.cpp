@@ -4,6 +4,7 @@
 #include "filigree/mesh.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/physics/body/make_cells.h"
+#include "filigree/sample/closure.h"
 #include "io/corpus.h"
 #include "threads.h"
 

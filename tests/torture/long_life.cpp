@@ -2,8 +2,8 @@
 // Memory has to stay, and results to be at the end what they were at the beginning.
 //   long_life ROUNDS FRAMES [--leak]     (--leak keeps 100 kB a round and frame, to see that it would be noticed)
 #include <filigree/deform/warp_steps.h>
-#include <filigree/io/model_file.h>
-#include <filigree/io/shared_work.h>
+#include <filigree/file.h>
+#include <filigree/io/system/shared_work.h>
 #include <filigree/mesh.h>
 #include <filigree/physics/simulation.h>
 #include <filigree/pose.h>

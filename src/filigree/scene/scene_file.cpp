@@ -420,6 +420,10 @@ private:
 
 } // namespace
 
+Error scene_error(const SceneFile& scene, unsigned line, ErrorCode code, const std::string& what) {
+    return error_at(scene.path, line, code, what);
+}
+
 Result<SceneFile> read_scene(const std::string& path, std::span<const SceneValue> values) {
     try {
         SceneReader reader(path);
