@@ -1,29 +1,33 @@
 // Another program moved the driver and handed back positions alone: the gradients are estimated from them.
 #include <filigree/filigree.h>
 
-#include <cmath>
 #include <cstdio>
 
 using namespace filigree;
 
-/// Mean height of the sheet's bumps when its driver is stretched to `factor` along x.
-double bump_height(const Model& model, const Restorer& restorer, float factor, const RunContext& context) {
-    Pose pose = rest_pose(model);
-    for (Vec3f& p : pose.positions) p.x() *= factor;
-    const std::vector<Vec3f> restored = restorer.positions(pose, context).value();
-    double sum = 0;
-    for (const Vec3f& p : restored) sum += double(std::abs(p.z()));
-    return sum / double(restored.size());
-}
-
 int main() {
-    const RunContext context;
-    Mesh sheet = make_wavy_plane({.resolution = 128, .frequency = 8, .amplitude = 0.02});
-    const Model model = strip(std::move(sheet), {.base = 25}, context).value().model;
-    const Restorer restorer = Restorer::create(model, {}, context).value();
+    const Mesh mesh = make_wavy_sphere({.resolution = 96});
+    const Model model = strip(mesh, {.base = 1000}).value().model;
+    const Restorer restorer = Restorer::create(model).value();
 
-    // Positions in a plane do not say what happens off it: bumps grow with the square root of the area around them.
-    const double rest = bump_height(model, restorer, 1, context), stretched = bump_height(model, restorer, 4, context);
-    std::printf("height at rest %.5f; stretched 4 times %.5f\n", rest, stretched);
-    return std::abs(stretched / rest - 2) < 0.2 ? 0 : 1;
+    // A bend stands for the other program.
+    const auto bend = make_bend(world_bounds(mesh), Axis::z, 90);
+    const Pose with_gradients = warp_pose(*bend, model);
+    const Pose positions_alone{with_gradients.positions, {}};
+
+    Mesh bent = mesh; // the long way: every vertex
+    warp_mesh(*bend, bent);
+    const auto error = [&](const Pose& pose) {
+        const VertexDistance distance = vertex_distance(restorer.mesh(pose).value(), bent).value();
+        return distance.rms / bounds(bent).diagonal();
+    };
+    const double exact = error(with_gradients), estimated = error(positions_alone);
+    std::printf("rms error, fraction of the diagonal: %.1e with gradients, %.1e from positions alone\n", exact,
+                estimated);
+
+    // PoseError says so without the long way.
+    const auto gradients = restorer.gradients(positions_alone).value();
+    const PoseError::Estimate estimate = PoseError(model).estimate(positions_alone, gradients).value();
+    std::printf("estimated from the pose: %.1e\n", estimate.share());
+    return exact < 5e-5 && estimated < 1e-4 && !estimate.is_too_curved() ? 0 : 1;
 }

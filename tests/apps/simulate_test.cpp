@@ -476,7 +476,7 @@ TEST_F(Simulate, KeysThatDoNothingForAModelAreRefused) {
     refused(kBody + "bending = 0.1\n", {"bad.toml:3:", "'bending'", "\"springs\"", "\"fem\""});
     refused(kBody + "material = \"clay\"\nbending = 0.1\n", {"bad.toml:4:", "'bending'", "\"meshfree\""});
     refused(kBody + "material = \"lattice\"\npoisson_ratio = 0.25\n",
-            {"bad.toml:4:", "'poisson_ratio'", "\"fem\" or \"meshfree\"", "is \"springs\""});
+            {"bad.toml:4:", "'poisson_ratio'", "\"fem\", \"meshfree\" or \"mpm\"", "is \"springs\""});
     for (const std::string key : {"young_modulus", "poisson_ratio", "internal_damping"})
         refused(kBody + "material = \"stone\"\n" + key + " = 0.1\n", {"bad.toml:4:", "'" + key + "'", "is \"rigid\""});
     // What a material brings along is left out without a word.

@@ -1,4 +1,4 @@
-// Coded files that people keep: those of tests/coding/kept_files, written by version 0.1 on 2026-11-27, are read as
+// Coded files that people keep: those of tests/pack/kept_files, written by version 0.1 on 2026-11-27, are read as
 // they were then. A ring of triangles and quads with a hole and loose vertices, in a random order; `crumpled` is a
 // small ball.
 #include "filigree/io/model/model_file.h"
@@ -46,7 +46,7 @@ TEST(KeptFiles, AreReadAsTheyWere) {
     };
     for (const KeptFile& file : files) {
         SCOPED_TRACE(file.name);
-        const std::string path = std::string(FILIGREE_ROOT "/tests/coding/kept_files/") + file.name + ".fil";
+        const std::string path = std::string(FILIGREE_ROOT "/tests/pack/kept_files/") + file.name + ".fil";
         const Result<Model> model = read_model(path, kTwoThreads);
         ASSERT_TRUE(model.ok()) << model.error().message;
         const Mesh& mesh = model->mesh;
