@@ -243,7 +243,7 @@ TEST_F(PointCache, NumbersThatAreNotFiniteAreFoundWhenTheirFrameIs) {
     // cut off after it was opened
     ASSERT_EQ(::truncate(path("a.pc2").c_str(), 70), 0);
     EXPECT_TRUE(poses->frame(0).ok());
-    says(poses->frame(1).error(), ErrorCode::bad_file, {"cut off"});
+    says(poses->frame(1).error(), ErrorCode::not_found, {"a.pc2", "became shorter"});
 }
 
 TEST_F(PointCache, OnlyFilesAreOpened) {
