@@ -141,6 +141,8 @@ def _member(member, indent):
         declared = f"{template}{name} = {type_}" if "(" not in type_ else f"{template}{name}"
     else:
         initializer = "".join(member.find("initializer").itertext()) if member.find("initializer") is not None else ""
+        if "{." in initializer.replace(" ", ""):  # Sphinx does not know designated initialisers
+            initializer = ""
         declared = f"{type_} {name}{member.findtext('argsstring') or ''} {' '.join(initializer.split())}".strip()
     return [f"{indent}.. cpp:{kind_of[kind]}:: {declared}", ""] + _text(member, indent + "   ")
 

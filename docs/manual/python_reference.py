@@ -9,6 +9,7 @@ AREAS = {
     "Comparing": ["compare", "vertex_distances", "distances_to_surface", "edge_strains"],
     "Points inside": ["contains", "InsideTest", "sample"],
     "Quads and pieces": ["remesh", "fracture", "FracturedMesh"],
+    "The report's method": ["strip_reference", "ReferenceModel"],
     "Bodies": ["Body", "Material", "materials", "Simulation", "Attachment", "Actor", "Obstacle", "Pin", "Force", "Hand", "HeatSource", "RigidMotion", "SceneRun"],
     "Writing for other programs": ["export", "write_animation"],
     "Pictures": ["render", "read_picture", "write_picture"],
