@@ -24,6 +24,12 @@ static_assert(kPointBytes == 12);
 class CacheFile {
 public:
     static Result<std::shared_ptr<const CacheFile>> open(const fs::path& path) {
+        std::error_code ignored;
+        const fs::file_status status = fs::status(path, ignored);
+        if (fs::is_other(status) || fs::is_fifo(status)) // to open a pipe waits for its writer
+            return Error{ErrorCode::unsupported, path.string() +
+                                                     ": is a pipe or device, and frames of point caches are "
+                                                     "fetched in any order; write it to a file first."};
         Result<FileReader> bytes = FileReader::open(path);
         if (!bytes) return bytes.error();
         return std::make_shared<const CacheFile>(*std::move(bytes), path.string());
