@@ -106,8 +106,7 @@ Eigen::MatrixXd gradient_weights(const LocalSet& set) {
 } // namespace
 
 GradientFit::GradientFit(const Mesh& driver, const RunContext& context) : rest_(driver.positions) {
-    const IndexLists neighbours =
-        space_neighbours(driver, vertex_normals(driver, driver.positions, context), NeighbourKind::in_space, context);
+    const IndexLists neighbours = space_neighbours(driver, vertex_normals(driver, driver.positions, context), context);
     const std::size_t count = rest_.size();
     term_offsets_ = neighbours.offsets;
     terms_.assign(neighbours.items.size(), {});

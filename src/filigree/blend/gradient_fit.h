@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/context.h"
+#include "filigree/mesh.h"
 #include "filigree/mesh/edges.h"
 
 namespace filigree {

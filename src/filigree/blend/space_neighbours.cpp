@@ -77,8 +77,8 @@ struct Part {
 
 class Search {
 public:
-    Search(const Mesh& mesh, std::span<const Vec3f> normals, NeighbourKind kind)
-        : mesh_(mesh), normals_(normals), kind_(kind), place_(weld_map(mesh.positions)) {
+    Search(const Mesh& mesh, std::span<const Vec3f> normals)
+        : mesh_(mesh), normals_(normals), place_(weld_map(mesh.positions)) {
         link_places();
         split_into_parts();
     }
@@ -100,10 +100,8 @@ public:
         const auto is_reached = [&](Index v) { return scratch.mark[v] == 2 * scratch.round + 1; };
         for (const auto& [distance, v] : scratch.candidates) {
             if (found.size() == kNear) break;
-            if (v != own && (is_reached(v) || (kind_ == NeighbourKind::in_space && has_matter_between(own, v))))
-                found.push_back(v);
+            if (v != own && (is_reached(v) || has_matter_between(own, v))) found.push_back(v);
         }
-        if (kind_ == NeighbourKind::along_surface) return;
         const std::size_t near_count = found.size();
         part.some.nearest(mesh_.positions[own], kTried * kFar + kNear, scratch.candidates);
         for (const auto& [distance, v] : scratch.candidates) {
@@ -181,7 +179,6 @@ private:
 
     const Mesh& mesh_;
     std::span<const Vec3f> normals_;
-    NeighbourKind kind_;
     std::vector<Index> place_; ///< of each vertex: the lowest vertex there
     IndexLists links_;         ///< the edges at each place
     std::vector<Index> part_of_;
@@ -190,9 +187,8 @@ private:
 
 } // namespace
 
-IndexLists space_neighbours(const Mesh& mesh, std::span<const Vec3f> normals, NeighbourKind kind,
-                            const RunContext& context) {
-    const Search search(mesh, normals, kind);
+IndexLists space_neighbours(const Mesh& mesh, std::span<const Vec3f> normals, const RunContext& context) {
+    const Search search(mesh, normals);
     std::vector<std::vector<Index>> lists(search.vertex_count());
     const std::size_t grain = std::max<std::size_t>(256, lists.size() / 64); // each piece marks all vertices once
     parallel_for(context, lists.size(), grain, [&](std::size_t begin, std::size_t end) {

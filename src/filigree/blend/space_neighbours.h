@@ -7,17 +7,11 @@
 
 namespace filigree {
 
-enum class NeighbourKind {
-    in_space,
-    along_surface, ///< only those that are reached along the surface from nearby: cloth and skin
-};
-
-/// For each vertex 24 of the nearest and, in space, 8 of every eighth vertex, which see past a flat place; fewer where
-/// there are no more. Ascending in distance within both, none at the vertex's own place and at most one a place. From
-/// other connected parts only where the vertex's own has too few; and none that lies across a gap, where the surface
-/// neither leads to it nearby nor has matter between. normals: one a vertex, zero where it has no face. Same lists for
-/// any thread count. Cost O(V log V).
-IndexLists space_neighbours(const Mesh& mesh, std::span<const Vec3f> normals, NeighbourKind kind,
-                            const RunContext& context);
+/// For each vertex: 24 of the nearest vertices, and 8 of every eighth vertex, which see past a flat place; fewer where
+/// there are no more. Both ascend in distance; there is none at the vertex's own place and at most one at any place.
+/// Other connected parts count only where the vertex's own part has too few. A vertex across a gap does not count: the
+/// surface has to lead to it nearby, or matter has to be between. normals: one a vertex, zero where it has no face. The
+/// same lists for any number of threads. Cost O(V log V).
+IndexLists space_neighbours(const Mesh& mesh, std::span<const Vec3f> normals, const RunContext& context);
 
 } // namespace filigree
