@@ -38,9 +38,9 @@ void export_levels(const Model& model, const ExportArguments& options, Session& 
                options.input + (options.at_rest ? ": a" : ": has no poses, and a") +
                    " model at rest goes to .glb, or with --web to a folder with a page; 'filigree simulate' makes "
                    "poses, and --poses takes another program's.");
-    const std::string given = session.first_given(
-        {"--as", "--key-rate", "--interpolation", "--influences", "--full-precision", "--compress", "--no-normals",
-         "--morph-normals", "--law", "--level", "--thin-shell", "--frame-rate", "--animation", "--pose-up"});
+    const std::string given =
+        session.first_given({"--as", "--key-rate", "--interpolation", "--influences", "--full-precision", "--compress",
+                             "--no-normals", "--morph-normals", "--level", "--frame-rate", "--animation", "--pose-up"});
     if (!given.empty())
         refuse(given + " belongs to a model that moves, and " + options.input +
                " is exported at rest; 'filigree level' writes one level of it.");
@@ -97,9 +97,8 @@ std::vector<MeshMaterial> page_materials(const Mesh& mesh, const std::string& in
 /// The model as a coded file that comes level by level, with its poses.
 void export_stream(const Model& model, const PoseSequence& own, const ExportArguments& options, Session& session,
                    Report& report) {
-    const std::string given =
-        session.first_given({"--as", "--key-rate", "--interpolation", "--influences", "--full-precision",
-                             "--no-normals", "--morph-normals", "--law", "--level", "--thin-shell"});
+    const std::string given = session.first_given({"--as", "--key-rate", "--interpolation", "--influences",
+                                                   "--full-precision", "--no-normals", "--morph-normals", "--level"});
     if (!given.empty()) refuse(given + " belongs to pages that play a GLB; leave out --stream.");
     PoseSequence poses;
     if (!options.at_rest && (!options.poses.empty() || !own.empty())) {
@@ -137,7 +136,7 @@ void export_glb_page(const ExportArguments& options, const std::string& glb, Ses
     const std::string given =
         session.first_given({"--poses", "--frame-rate", "--animation", "--rest", "--stream", "--bits", "--as",
                              "--key-rate", "--interpolation", "--influences", "--full-precision", "--all-levels",
-                             "--no-normals", "--morph-normals", "--law", "--level", "--thin-shell", "--pose-up"});
+                             "--no-normals", "--morph-normals", "--level", "--pose-up"});
     if (!given.empty()) refuse(given + " belongs to a model, and the page plays " + options.input + " as it is.");
     const GltfScene scene = require(GltfScene::read_view(glb, options.input, session.context()));
     if (!scene.files_beside().empty())

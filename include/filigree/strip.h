@@ -181,9 +181,6 @@ struct Stripped {
 /// check_mesh refuses the mesh), unsuitable (no vertices; more than 2^32 / 3 triangles), cancelled.
 Result<Stripped> strip(Mesh mesh, const StripOptions& options = {}, const RunContext& context = RunContext());
 
-/// The errors of strip that are known before any work: usage, unsuitable (no vertices). Cost O(size).
-std::optional<Error> check_strip(const Mesh& mesh, const StripOptions& options);
-
 /// Takes the detail off a mesh, for a driver that was made elsewhere: any mesh near it, with its own vertices. A pose
 /// has the positions of that driver's vertices, in their order. Each vertex is bound to the side of the driver that it
 /// belongs to along the surface. No driver is refused: the report's warnings say when it is inside out or too far away.

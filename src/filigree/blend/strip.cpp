@@ -109,8 +109,7 @@ std::optional<Error> check_level(const Mesh& mesh, const Level& driver) {
     return std::nullopt;
 }
 
-} // namespace
-
+/// The errors of strip that are known before any work.
 std::optional<Error> check_strip(const Mesh& mesh, const StripOptions& options) {
     if (std::optional<Error> error = mesh_error(mesh)) return error;
     if (int(options.base.has_value()) + int(options.levels.has_value()) + int(options.error.has_value()) > 1)
@@ -126,8 +125,6 @@ std::optional<Error> check_strip(const Mesh& mesh, const StripOptions& options) 
     if (mesh.vertex_count() == 0) return Error{ErrorCode::unsuitable, "The mesh has no vertices: nothing to strip."};
     return std::nullopt;
 }
-
-namespace {
 
 /// positions: the mesh's first, `own` of them, then the driver's.
 std::vector<std::string> driver_warnings(std::span<const Vec3f> positions, std::size_t own, std::size_t facing_away) {
