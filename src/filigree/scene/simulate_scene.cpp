@@ -10,7 +10,8 @@ Result<SceneMotion> simulate_scene(const SceneFile& scene, const RunContext& con
     if (!run) return run.error();
     if (Status simulated = run->advance_to(scene.frames, context); !simulated) return simulated.error();
 
-    SceneMotion motion{.origin = ready->origin, .bodies = {}, .warnings = ready->warnings, .broke_down = run->broke_down()};
+    SceneMotion motion{
+        .origin = ready->origin, .bodies = {}, .warnings = ready->warnings, .broke_down = run->broke_down()};
     for (std::string& warning : run->warnings()) motion.warnings.push_back(std::move(warning));
     const std::vector<PoseSequence>& poses = run->recording().poses;
     for (std::size_t b = 0; b < poses.size(); ++b) {
