@@ -9,6 +9,8 @@
 #include "window.h"
 #include "words.h"
 
+#include "filigree/file.h"
+
 #include <QActionGroup>
 #include <QApplication>
 #include <QFileInfo>
@@ -20,10 +22,21 @@
 namespace filigree::studio {
 namespace {
 
-const QString kMeshes = QStringLiteral("Meshes (*.obj *.ply *.stl *.off *.glb)");
 const QString kModels = QStringLiteral("Filigree models (*.fil)");
-const QString kOpenable = QStringLiteral("Meshes and models (*.fil *.obj *.ply *.stl *.off *.glb *.gltf)");
 const QString kAll = QStringLiteral("All files (*)");
+
+/// " *.obj *.ply ...", for a file dialog.
+QString mesh_patterns(bool for_reading) {
+    QString patterns;
+    for (const MeshFormatInfo& info : mesh_formats())
+        for (const std::string_view extension : {info.extension, info.other_extension})
+            if (!extension.empty() && (for_reading || extension == info.extension))
+                patterns += " *" + QString::fromUtf8(extension.data(), qsizetype(extension.size()));
+    return patterns;
+}
+
+const QString kMeshes = "Meshes (" + mesh_patterns(false).trimmed() + ')';
+const QString kOpenable = "Meshes and models (*.fil" + mesh_patterns(true) + ')';
 
 /// A row of a menu.
 struct Command {
@@ -123,7 +136,7 @@ struct Actions::Impl {
         return {
             {"file.open",
              "&Open…",
-             "Opens a mesh (OBJ, PLY, STL, OFF) or a model (FIL)",
+             "Opens a mesh or a model (.fil)",
              "Ctrl+O",
              [this] { open(); },
              {},

@@ -60,7 +60,7 @@ Result<Options> parse(const QApplication& application) {
     parser.setApplicationDescription("Opens a mesh or a model, lets you pull it, and puts the detail back.");
     const QCommandLineOption help = parser.addHelpOption();
     parser.addVersionOption();
-    parser.addPositionalArgument("file", "A mesh (.obj .ply .stl .off .glb .gltf) or a model (.fil).", "[FILE]");
+    parser.addPositionalArgument("file", "A mesh or a model (.fil).", "[FILE]");
     parser.addOptions({
         {"screenshot", "Show the window, save it as a PNG, leave.", "PNG"},
         {"size", "Size of the window, pixels.", "WxH"},

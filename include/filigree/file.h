@@ -46,6 +46,17 @@ struct MeshFile {
     std::vector<std::string> warnings;
 };
 
+/// What a program says of a format: in messages, in file dialogs.
+struct MeshFormatInfo {
+    MeshFormat format;
+    std::string_view name;            ///< "PLY"
+    std::string_view extension;       ///< ".ply": of a file that is written
+    std::string_view other_extension; ///< ".gltf": is read only; empty: none
+};
+
+/// All formats, in the order in which programs list them.
+std::span<const MeshFormatInfo> mesh_formats();
+
 /// The format that the extension of a path names (any case). Errors: unsupported, with the list of formats.
 Result<MeshFormat> mesh_format(const std::filesystem::path& path);
 

@@ -5,7 +5,6 @@
 
 #include <filigree/result.h>
 
-#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -24,7 +23,7 @@ void warn(const std::vector<std::string>& sentences);
 /// What a word stands for; refuses others with the list of those there are.
 template <class Value>
 Value value_of(const std::string& word, const char* name,
-               std::initializer_list<std::pair<std::string_view, Value>> words) {
+               const std::vector<std::pair<std::string_view, Value>>& words) {
     std::string list;
     for (const auto& [known, value] : words) {
         if (known == word) return value;

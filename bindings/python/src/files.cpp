@@ -25,12 +25,11 @@ MeshPtr read_mesh_file(const fs::path& path, unsigned threads, const py::object&
 
 std::optional<MeshFormat> format_of(const std::optional<std::string>& name) {
     if (!name) return {};
-    return value_of<MeshFormat>(*name, "format",
-                                {{"obj", MeshFormat::obj},
-                                 {"ply", MeshFormat::ply},
-                                 {"stl", MeshFormat::stl},
-                                 {"off", MeshFormat::off},
-                                 {"gltf", MeshFormat::gltf}});
+    std::vector<std::pair<std::string_view, MeshFormat>> words;
+    for (const MeshFormatInfo& info : mesh_formats())
+        for (const std::string_view extension : {info.extension, info.other_extension})
+            if (!extension.empty()) words.emplace_back(extension.substr(1), info.format);
+    return value_of<MeshFormat>(*name, "format", words);
 }
 
 void write_mesh_file(const py::object& given, const fs::path& path, const std::optional<std::string>& format,
@@ -154,9 +153,9 @@ Parameters
 ----------
 mesh : Mesh, or an object with vertices and faces or triangles
 path : path
-    .obj, .ply, .stl, .off, .glb or .gltf.
+    .obj, .ply, .stl, .off or .glb.
 format : str, optional
-    'obj', 'ply', 'stl', 'off' or 'gltf'; None: from the path's ending.
+    'obj', 'ply', 'stl', 'off' or 'glb'; None: by the extension of the path.
 ascii : bool
     PLY and STL: text.
 big_endian : bool
@@ -236,7 +235,7 @@ profile : str
     'compact', the fewest bits; 'stream': coarse to fine, so that every beginning of the file is a mesh; 'lossless':
     any model, levels included, and every number comes back bit for bit, whatever `bits`, `surface` and `keep_order`.
 poses : PoseSequence, array_like (f, d, 3), or sequence of Pose, optional
-    As of `write_model`; coded too, 1e-5 of the diagonal off (rms).
+    As of `write_model`; packed too, 1e-5 of the diagonal off (rms).
 
 Returns
 -------

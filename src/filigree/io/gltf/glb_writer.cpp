@@ -4,9 +4,9 @@
 
 namespace filigree {
 
-Result<GlbNotes> write_glb(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
-                           const RunContext& context) {
-    GlbNotes notes;
+Result<WriteNotes> write_glb(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
+                             const RunContext& context) {
+    WriteNotes notes;
     GlbBuilder builder;
     {
         const Result<GlbParts> made = make_glb_parts(mesh, {}, context);

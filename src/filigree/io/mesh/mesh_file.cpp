@@ -14,7 +14,43 @@ namespace filigree {
 
 namespace {
 
-constexpr std::string_view kKnownFormats = "use .obj, .ply, .stl, .off or .glb";
+/// A format. To add one: its reader and writer in a file of their own, MeshFormat, and a row below.
+struct FormatRow {
+    MeshFormatInfo info;
+    bool (*is_content)(std::string_view bytes);
+    bool is_content_certain; ///< else the extension of the name decides first
+    Result<MeshFile> (*read)(const MeshSource& source);
+    Result<WriteNotes> (*write)(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
+                                const RunContext& context);
+};
+
+constexpr std::array kFormats = {
+    FormatRow{{MeshFormat::obj, "OBJ", ".obj", ""}, is_obj, false, read_obj, write_obj},
+    FormatRow{{MeshFormat::ply, "PLY", ".ply", ""}, is_ply, true, read_ply, write_ply},
+    FormatRow{{MeshFormat::stl, "STL", ".stl", ""}, is_stl, true, read_stl, write_stl},
+    FormatRow{{MeshFormat::off, "OFF", ".off", ""}, is_off, true, read_off, write_off},
+    FormatRow{{MeshFormat::gltf, "GLB", ".glb", ".gltf"}, is_gltf, true, read_gltf, write_glb},
+};
+
+constexpr std::array kInfos = [] {
+    std::array<MeshFormatInfo, kFormats.size()> infos{};
+    std::ranges::transform(kFormats, infos.begin(), &FormatRow::info);
+    return infos;
+}();
+
+const FormatRow& row_of(MeshFormat format) {
+    return *std::ranges::find(kFormats, format, [](const FormatRow& row) { return row.info.format; });
+}
+
+/// "use .obj, .ply, .stl, .off or .glb"
+std::string known_formats() {
+    std::string sentence = "use ";
+    for (std::size_t i = 0; i < kInfos.size(); ++i) {
+        if (i > 0) sentence += i + 1 < kInfos.size() ? ", " : " or ";
+        sentence += kInfos[i].extension;
+    }
+    return sentence;
+}
 
 /// Content that is recognised, and what to say about it.
 struct Foreign {
@@ -52,39 +88,21 @@ const Foreign* find_foreign(std::string_view bytes) {
     return wide ? &kWideText : nullptr;
 }
 
-/// The format the content tells of.
-std::optional<MeshFormat> sniff_format(std::string_view bytes) {
-    if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r") || bytes.starts_with("ply ")) return MeshFormat::ply;
-    if (is_ascii_stl(bytes) || is_binary_stl(bytes)) return MeshFormat::stl;
-    if (is_off(bytes)) return MeshFormat::off;
-    if (is_gltf(bytes)) return MeshFormat::gltf;
-    return {};
+std::optional<MeshFormat> format_of_content(std::string_view bytes, bool is_certain) {
+    const auto found = std::ranges::find_if(
+        kFormats, [&](const FormatRow& row) { return row.is_content_certain == is_certain && row.is_content(bytes); });
+    if (found == kFormats.end()) return std::nullopt;
+    return found->info.format;
 }
 
 Result<MeshFormat> decide_format(std::string_view bytes, const std::string& name) {
-    if (const auto format = sniff_format(bytes)) return *format;
+    if (const auto format = format_of_content(bytes, true)) return *format;
     Result<MeshFormat> by_name = mesh_format(name);
     if (by_name.ok()) return by_name;
-    if (is_obj(bytes)) return MeshFormat::obj;
+    if (const auto format = format_of_content(bytes, false)) return *format;
     return Error{ErrorCode::unsupported, name +
                                              ": neither its content nor its extension is of a mesh format we read; " +
-                                             std::string(kKnownFormats) + "."};
-}
-
-Result<MeshFile> parse(const MeshSource& source, MeshFormat format) {
-    switch (format) {
-    case MeshFormat::obj:
-        return read_obj(source);
-    case MeshFormat::ply:
-        return read_ply(source);
-    case MeshFormat::stl:
-        return read_stl(source);
-    case MeshFormat::off:
-        return read_off(source);
-    case MeshFormat::gltf:
-        return read_gltf(source);
-    }
-    return source.unsupported("this format is not read.");
+                                             known_formats() + "."};
 }
 
 void mend_attributes(MeshFile& file) {
@@ -139,7 +157,7 @@ Result<MeshFile> read_checked(std::string_view bytes, const std::string& name, c
     const std::string_view text = bytes.starts_with(byte_order_mark) ? bytes.substr(byte_order_mark.size()) : bytes;
     const Result<MeshFormat> format = decide_format(text, name);
     if (!format.ok()) return format.error();
-    Result<MeshFile> file = parse({text, name, context}, *format);
+    Result<MeshFile> file = row_of(*format).read({text, name, context});
     if (!file.ok()) return file;
     if (file->mesh.positions.empty())
         return source.error("has no vertices." + (file->warnings.empty() ? "" : " " + file->warnings.front()));
@@ -158,10 +176,10 @@ Error out_of_memory(const std::string& name) {
     return {ErrorCode::out_of_memory, name + ": does not fit into memory."};
 }
 
-std::vector<std::string> with_losses(const std::string& format, const std::vector<std::string>& lost,
-                                     std::vector<std::string> warnings) {
-    if (!lost.empty()) warnings.insert(warnings.begin(), cannot_hold(format, lost));
-    return warnings;
+std::vector<std::string> sentences(std::string_view format, WriteNotes notes) {
+    if (!notes.lost.empty())
+        notes.warnings.insert(notes.warnings.begin(), cannot_hold(std::string(format), notes.lost));
+    return std::move(notes.warnings);
 }
 
 /// An OBJ with its embedded materials beside it: pictures first, the mesh last, each whole or not at all.
@@ -180,7 +198,7 @@ Result<std::vector<std::string>> write_obj_with_materials(const Mesh& mesh, cons
         if (const Status written = write_file(path.parent_path() / file.name, *file.bytes); !written)
             return written.error();
     }
-    return with_losses("OBJ", lost, std::move(library.warnings));
+    return sentences("OBJ", {std::move(lost), std::move(library.warnings)});
 }
 
 /// Whether other files can lie beside it: no pipe or device.
@@ -192,16 +210,17 @@ bool is_file_in_folder(const std::filesystem::path& path) {
 
 } // namespace
 
+std::span<const MeshFormatInfo> mesh_formats() { return kInfos; }
+
 Result<MeshFormat> mesh_format(const std::filesystem::path& path) {
     const std::string extension = lower_extension(path);
-    if (extension == ".obj") return MeshFormat::obj;
-    if (extension == ".ply") return MeshFormat::ply;
-    if (extension == ".stl") return MeshFormat::stl;
-    if (extension == ".off") return MeshFormat::off;
-    if (extension == ".glb" || extension == ".gltf") return MeshFormat::gltf;
+    const auto found = std::ranges::find_if(kInfos, [&](const MeshFormatInfo& info) {
+        return !extension.empty() && (extension == info.extension || extension == info.other_extension);
+    });
+    if (found != kInfos.end()) return found->format;
     return Error{ErrorCode::unsupported, path.string() + ": " +
                                              (extension.empty() ? "a name without an extension" : extension) +
-                                             " is not of a mesh format we know; " + std::string(kKnownFormats) + "."};
+                                             " is not of a mesh format we know; " + known_formats() + "."};
 }
 
 Result<MeshFile> read_mesh(std::string_view bytes, const std::string& name, const RunContext& context) {
@@ -224,42 +243,16 @@ Result<std::vector<std::string>> write_mesh(const Mesh& mesh, MeshFormat format,
                                             const WriteMeshOptions& options, const RunContext& context) {
     if (std::optional<Error> error = mesh_error(mesh)) return *error;
     bytes.clear();
-    std::vector<std::string> lost, warnings;
-    const char* name = "";
+    const FormatRow& row = row_of(format);
     try {
-        switch (format) {
-        case MeshFormat::obj:
-            name = "OBJ", lost = write_obj(mesh, "", bytes);
-            break;
-        case MeshFormat::ply:
-            name = "PLY", lost = write_ply(mesh, options, bytes);
-            break;
-        case MeshFormat::stl:
-            name = "STL";
-            if (Result<std::vector<std::string>> left_out = write_stl(mesh, options, bytes, context))
-                lost = *std::move(left_out);
-            else
-                return left_out.error();
-            break;
-        case MeshFormat::off:
-            name = "OFF", lost = write_off(mesh, bytes);
-            break;
-        case MeshFormat::gltf:
-            name = "GLB";
-            if (Result<GlbNotes> notes = write_glb(mesh, options, bytes, context)) {
-                lost = std::move(notes->lost);
-                warnings = std::move(notes->warnings);
-            } else {
-                return notes.error();
-            }
-            break;
-        }
+        Result<WriteNotes> notes = row.write(mesh, options, bytes, context);
+        if (!notes) return notes.error();
+        return sentences(row.info.name, *std::move(notes));
     } catch (const std::bad_alloc&) {
-        return out_of_memory(name);
+        return out_of_memory(std::string(row.info.name));
     } catch (const std::length_error&) {
-        return out_of_memory(name);
+        return out_of_memory(std::string(row.info.name));
     }
-    return with_losses(name, lost, std::move(warnings));
 }
 
 Result<std::vector<std::string>> write_mesh(const Mesh& mesh, const std::filesystem::path& path,
@@ -270,8 +263,10 @@ Result<std::vector<std::string>> write_mesh(const Mesh& mesh, const std::filesys
                                                 "); deform less."};
     const Result<MeshFormat> format = options.format ? Result<MeshFormat>(*options.format) : mesh_format(path);
     if (!format.ok()) return format.error();
-    if (*format == MeshFormat::gltf && lower_extension(path) == ".gltf")
-        return Error{ErrorCode::unsupported, path.string() + ": glTF is written as one file; write .glb."};
+    if (const MeshFormatInfo& info = row_of(*format).info;
+        !info.other_extension.empty() && lower_extension(path) == info.other_extension)
+        return Error{ErrorCode::unsupported,
+                     path.string() + ": is read but not written; write " + std::string(info.extension) + "."};
     if (context.is_cancelled()) return cancelled_error();
     if (*format == MeshFormat::obj && !mesh.embedded_materials.empty() && is_file_in_folder(path))
         return write_obj_with_materials(mesh, path);

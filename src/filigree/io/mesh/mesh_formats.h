@@ -1,4 +1,4 @@
-// The readers and writers behind mesh_file.h: a pair for each format, told what the dispatcher knows.
+// The readers and writers of the mesh formats. The table of formats is in mesh_file.cpp: a format is a row there.
 #pragma once
 
 #include "filigree/file.h"
@@ -34,34 +34,43 @@ struct MeshSource {
 /// Readers of rows look at cancel and report progress every so many.
 inline constexpr std::size_t kRowsBetweenReports = 1 << 16;
 
-/// Readers leave to the dispatcher: attributes that are not finite, and meshes without vertices or faces.
-/// Positions are finite and every index is in range.
+/// A reader leaves two things to read_mesh: attributes that are not finite, and meshes without vertices or faces. The
+/// positions that it returns are finite, and every index is in range.
 Result<MeshFile> read_obj(const MeshSource& source);
 Result<MeshFile> read_ply(const MeshSource& source);
 Result<MeshFile> read_stl(const MeshSource& source);
 Result<MeshFile> read_off(const MeshSource& source);
 Result<MeshFile> read_gltf(const MeshSource& source);
 
-/// Writers append to `bytes` and return what the format cannot hold, a noun each ("materials").
-/// library: the name of the .mtl that holds the embedded materials; empty: they are lost.
-std::vector<std::string> write_obj(const Mesh& mesh, std::string_view library, std::string& bytes);
-std::vector<std::string> write_ply(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes);
-Result<std::vector<std::string>> write_stl(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
-                                           const RunContext& context);
-std::vector<std::string> write_off(const Mesh& mesh, std::string& bytes);
-
-/// What is lost, and further sentences (textures that are not there).
-struct GlbNotes {
-    std::vector<std::string> lost, warnings;
+/// What a writer tells of the mesh that it wrote.
+struct WriteNotes {
+    std::vector<std::string> lost;     ///< what the format cannot hold, a noun each ("materials")
+    std::vector<std::string> warnings; ///< further sentences (textures that are missing)
 };
-/// In glb_writer.cpp. Errors: unsupported (4 GiB or more), cancelled.
-Result<GlbNotes> write_glb(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
-                           const RunContext& context);
 
-/// Whether the content says so: "solid", and a facet or the end near the start.
-bool is_ascii_stl(std::string_view bytes);
-/// Whether the size is exactly what the facet count in the header asks for.
-bool is_binary_stl(std::string_view bytes);
+/// A writer appends to `bytes`.
+Result<WriteNotes> write_obj(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
+                             const RunContext& context);
+Result<WriteNotes> write_ply(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
+                             const RunContext& context);
+/// Errors: cancelled.
+Result<WriteNotes> write_stl(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
+                             const RunContext& context);
+Result<WriteNotes> write_off(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
+                             const RunContext& context);
+/// In glb_writer.cpp. Errors: unsupported (4 GiB or more), cancelled.
+Result<WriteNotes> write_glb(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
+                             const RunContext& context);
+
+/// An OBJ that names a material library beside it. library: the name of the .mtl file; empty: embedded materials are
+/// lost. Returns what is lost.
+std::vector<std::string> write_obj(const Mesh& mesh, std::string_view library, std::string& bytes);
+
+/// Whether the first line is "ply".
+bool is_ply(std::string_view bytes);
+/// Whether the content says so. Text: "solid", and a facet or the end near the start. Binary: the size is exactly what
+/// the facet count in the header asks for.
+bool is_stl(std::string_view bytes);
 /// Whether the first word is one of OFF's ("OFF", "COFF", "STCNOFF" ...).
 bool is_off(std::string_view bytes);
 /// Whether the first statement is one of OBJ's; false for a file of comments.

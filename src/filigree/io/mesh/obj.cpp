@@ -474,6 +474,10 @@ std::vector<std::string> write_obj(const Mesh& mesh, std::string_view library, s
     return lost;
 }
 
+Result<WriteNotes> write_obj(const Mesh& mesh, const WriteMeshOptions&, std::string& bytes, const RunContext&) {
+    return WriteNotes{write_obj(mesh, "", bytes), {}};
+}
+
 bool is_obj(std::string_view bytes) {
     TextScanner text(bytes);
     text.skip_space();

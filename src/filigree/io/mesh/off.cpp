@@ -255,7 +255,7 @@ bool is_off(std::string_view bytes) {
 
 Result<MeshFile> read_off(const MeshSource& source) { return OffReader(source).read(); }
 
-std::vector<std::string> write_off(const Mesh& mesh, std::string& bytes) {
+Result<WriteNotes> write_off(const Mesh& mesh, const WriteMeshOptions&, std::string& bytes, const RunContext&) {
     const auto uvs = values_per_vertex(mesh.uvs, mesh);
     const auto normals = values_per_vertex(mesh.normals, mesh);
     const bool has_uvs = uvs && !uvs->empty(), has_normals = normals && !normals->empty(),
@@ -281,7 +281,7 @@ std::vector<std::string> write_off(const Mesh& mesh, std::string& bytes) {
     if (!mesh.objects.empty()) lost.emplace_back("objects");
     add_face_label_losses(mesh, lost);
     add_scalar_losses(mesh, lost);
-    return lost;
+    return WriteNotes{std::move(lost), {}};
 }
 
 } // namespace filigree

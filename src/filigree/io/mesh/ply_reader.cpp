@@ -488,6 +488,10 @@ private:
 
 } // namespace
 
+bool is_ply(std::string_view bytes) {
+    return bytes.starts_with("ply\n") || bytes.starts_with("ply\r") || bytes.starts_with("ply ");
+}
+
 Result<MeshFile> read_ply(const MeshSource& source) {
     const Result<HeaderAndBody> file = read_header(source);
     if (!file.ok()) return file.error();

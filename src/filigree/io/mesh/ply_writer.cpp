@@ -268,8 +268,8 @@ private:
 
 } // namespace
 
-std::vector<std::string> write_ply(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes) {
-    return PlyWriter(mesh, options, bytes).write();
+Result<WriteNotes> write_ply(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes, const RunContext&) {
+    return WriteNotes{PlyWriter(mesh, options, bytes).write(), {}};
 }
 
 } // namespace filigree

@@ -260,8 +260,6 @@ void write_ascii(const Mesh& mesh, const Triangulation& faces, std::string& byte
     name_solid("endsolid", object);
 }
 
-} // namespace
-
 bool is_ascii_stl(std::string_view bytes) {
     constexpr std::size_t kNameBytes = 2048; // names are short; binary headers have 80 bytes
     TextScanner text(bytes.substr(0, kNameBytes));
@@ -281,14 +279,18 @@ bool is_binary_stl(std::string_view bytes) {
            bytes.size() == kHeaderBytes + kCountBytes + std::size_t{facet_count(bytes)} * kFacetBytes;
 }
 
+} // namespace
+
+bool is_stl(std::string_view bytes) { return is_ascii_stl(bytes) || is_binary_stl(bytes); }
+
 Result<MeshFile> read_stl(const MeshSource& source) {
     // A binary file's header may hold any words; the count behind it does not fit the size of a text.
     const bool is_binary = is_binary_stl(source.bytes) || !is_ascii_stl(source.bytes);
     return is_binary ? read_binary(source) : AsciiReader(source).read();
 }
 
-Result<std::vector<std::string>> write_stl(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
-                                           const RunContext& context) {
+Result<WriteNotes> write_stl(const Mesh& mesh, const WriteMeshOptions& options, std::string& bytes,
+                             const RunContext& context) {
     const Result<Triangulation> cut = triangulate(mesh, context);
     if (!cut) return cut.error();
     const Triangulation& faces = *cut;
@@ -305,7 +307,7 @@ Result<std::vector<std::string>> write_stl(const Mesh& mesh, const WriteMeshOpti
     if (!options.ascii && !mesh.objects.empty()) lost.emplace_back("objects");
     add_face_label_losses(mesh, lost);
     add_scalar_losses(mesh, lost);
-    return lost;
+    return WriteNotes{std::move(lost), {}};
 }
 
 } // namespace filigree
