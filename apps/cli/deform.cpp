@@ -247,71 +247,64 @@ void deform_mesh(const Mesh& rest, const DeformArguments& options, Session& sess
 
 /// A warp of its own each time that it is given, in the order of the command line.
 OptionList warp_options(std::vector<WarpStep>& steps) {
-    const auto step = [&steps](const std::string& name, WarpKind kind, const std::string& text) {
-        return Option("--" + name, Option::EachNumber([&steps, kind](double amount) {
-                          steps.push_back({kind, amount});
-                      }),
-                      text);
-    };
-    return {
-        step("stretch", WarpKind::stretch, "Scale along the axis by this factor").above_zero(),
-        step("squeeze", WarpKind::squeeze, "Scale along the axis by this factor and across it so that the volume stays")
-            .above_zero(),
-        step("bend", WarpKind::bend, "Bend the axis into an arc of this many degrees").finite(),
-        step("twist", WarpKind::twist, "Turn the far end about the axis by this many degrees against the near end")
-            .finite(),
-        step("taper", WarpKind::taper, "Scale cross-sections, from 1 at the near end to this factor at the far end")
-            .above_zero(),
-        step("random", WarpKind::random, "Smooth random displacement of up to this fraction of the diagonal").finite()};
+    OptionList options;
+    for (const WarpInfo& info : warp_infos()) {
+        const auto add_step = [&steps, kind = info.kind](double amount) { steps.push_back({kind, amount}); };
+        Option option("--" + std::string(info.name), Option::EachNumber(add_step), std::string(info.action));
+        options = std::move(options) + OptionList{info.is_factor ? option.above_zero() : option.finite()};
+    }
+    return options;
 }
 
 } // namespace
 
 Command deform_command() {
     const auto options = std::make_shared<DeformArguments>();
-    return {.name = "deform",
-            .text = "Deform a mesh (every vertex) or a model (its driver, then restore); options apply in the order "
-                    "given",
-            .options =
-                OptionList{
-                    Option("file", options->input, "Mesh or model").is_read().required(),
-                    output_option(options->output,
-                                  "Mesh file to write; with --frames an animation: .glb, .pc2, .mdd, .usda, a folder "
-                                  "(NAME/), NAME_####.ply, or for a model .fil, the model with these poses")} +
-                warp_options(options->steps) +
-                OptionList{
-                    Option("--seed", options->seed, "Seed of --random").whole_from(0).with_default(),
-                    choice<Axis>("--axis", options->axis, {{"x", Axis::x}, {"y", Axis::y}, {"z", Axis::z}},
-                                 "Of all of these (unset: the longest side of the box)"),
-                    Option("--handles", options->handles,
-                           "Pull parts and let the rest follow as rigidly as possible: a JSON file, see "
-                           "docs/handles.md")
-                        .is_read(),
-                    Option("--pose", options->pose_output, "Models: also write the moved driver, with its gradients")
-                        .is_written(),
-                    Option("--frames", options->frames, "This many frames from the rest shape to the full deformation")
-                        .whole_from(2),
-                    Option("--frame-rate", options->frames_per_second, "Frames a second").above_zero().with_default()} +
-                restore_options(options->restore) + OptionList{law_option(options->law)} +
-                animation_options(options->animation),
-            .examples = "  filigree deform scan.fil -o bent.ply --bend 90 --twist 45\n"
-                        "  filigree deform scan.ply -o full.ply --bend 90 --twist 45\n"
-                        "  filigree deform scan.fil -o pulled.ply --handles pull.json\n"
-                        "  filigree deform scan.fil -o bent.glb --bend 90 --frames 60",
-            .run = [options](Session& session) {
-                check(*options, session);
-                const FileReader file = session.open(options->input);
-                if (is_reference_model(file, options->input, session))
-                    return deform_reference_code(read_reference(file, options->input, session), *options, session);
-                refuse_law(options->input, session);
-                const Session::Content content = session.read_any(file, options->input);
-                if (options->frames > 0)
-                    deform_animation(*options, content, session);
-                else if (const auto* model = std::get_if<Model>(&content.value))
-                    deform_model(*model, *options, session);
-                else
-                    deform_mesh(std::get<Mesh>(content.value), *options, session);
-            }};
+    return {
+        .name = "deform",
+        .text =
+            "Deform a mesh (every vertex) or a model (its driver, then restore); deformations apply in the order given",
+        .options =
+            OptionList{
+                Option("file", options->input, "Mesh or model").is_read().required(),
+                output_option(options->output,
+                              "Mesh file to write. With --frames an animation: .glb, .pc2, .mdd, .usda, a folder "
+                              "(NAME/), NAME_####.ply; for a model also .fil, the model with these poses")} +
+            warp_options(options->steps) +
+            OptionList{
+                Option("--seed", options->seed, "Seed of --random").whole_from(0).with_default(),
+                choice<Axis>("--axis", options->axis, {{"x", Axis::x}, {"y", Axis::y}, {"z", Axis::z}},
+                             "Axis of the deformations (default: the longest side of the box)"),
+                Option("--handles", options->handles,
+                       "Move parts of the mesh, and let the rest follow as rigidly as possible: a JSON file, see "
+                       "docs/handles.md")
+                    .is_read(),
+                Option("--pose", options->pose_output, "Models: also write the moved driver, with its gradients")
+                    .is_written(),
+                Option("--frames", options->frames,
+                       "Write an animation of this many frames, from rest to the full deformation")
+                    .whole_from(2),
+                Option("--frame-rate", options->frames_per_second, "Frames per second").above_zero().with_default()} +
+            restore_options(options->restore) + OptionList{law_option(options->law)} +
+            animation_options(options->animation),
+        .examples = "  filigree deform scan.fil -o bent.ply --bend 90 --twist 45\n"
+                    "  filigree deform scan.ply -o full.ply --bend 90 --twist 45\n"
+                    "  filigree deform scan.fil -o pulled.ply --handles pull.json\n"
+                    "  filigree deform scan.fil -o bent.glb --bend 90 --frames 60",
+        .run = [options](Session& session) {
+            check(*options, session);
+            const FileReader file = session.open(options->input);
+            if (is_reference_model(file, options->input, session))
+                return deform_reference_code(read_reference(file, options->input, session), *options, session);
+            refuse_law(options->input, session);
+            const Session::Content content = session.read_any(file, options->input);
+            if (options->frames > 0)
+                deform_animation(*options, content, session);
+            else if (const auto* model = std::get_if<Model>(&content.value))
+                deform_model(*model, *options, session);
+            else
+                deform_mesh(std::get<Mesh>(content.value), *options, session);
+        }};
 }
 
 } // namespace filigree::cli

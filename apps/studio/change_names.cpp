@@ -2,6 +2,8 @@
 
 #include "words.h"
 
+#include <vector>
+
 namespace filigree::studio {
 
 namespace {
@@ -12,7 +14,7 @@ struct Part {
 };
 
 /// The name of the part that has changed; of several: of the whole.
-QString name_of(std::initializer_list<Part> parts, const QString& whole) {
+QString name_of(const std::vector<Part>& parts, const QString& whole) {
     QString name;
     for (const Part& part : parts) {
         if (!part.is_changed) continue;
@@ -25,13 +27,11 @@ QString name_of(std::initializer_list<Part> parts, const QString& whole) {
 } // namespace
 
 QString name_of_change(const Warps& before, const Warps& after) {
-    return name_of({{before.axis != after.axis, "Axis"},
-                    {before.stretch != after.stretch, "Stretch"},
-                    {before.squeeze != after.squeeze, "Squeeze"},
-                    {before.bend != after.bend, "Bend"},
-                    {before.twist != after.twist, "Twist"},
-                    {before.taper != after.taper, "Taper"}},
-                   "Deform");
+    std::vector<Part> parts = {{before.axis != after.axis, "Axis"}};
+    for (const WarpInfo& info : warp_infos())
+        if (info.amount != nullptr)
+            parts.push_back({before.*info.amount != after.*info.amount, title_of(std::string(info.name))});
+    return name_of(parts, "Deform");
 }
 
 QString name_of_change(const Shape& before, const Shape& after) {

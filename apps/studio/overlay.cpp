@@ -21,7 +21,7 @@ const QColor kWarning(217, 138, 20), kPin(226, 74, 51), kOpen(235, 94, 40), kNon
     kOpposed(20, 110, 220), kFlat(150, 110, 0);
 const std::array<QColor, 3> kAxes = {QColor(214, 69, 65), QColor(76, 160, 72), QColor(62, 116, 214)};
 
-/// One each, as GizmoPart has them: of stretch, squeeze, bend, twist and taper.
+/// A colour for each handle, in the order of WarpKind: stretch, squeeze, bend, twist, taper.
 const std::array<QColor, 5> kGizmos = {QColor(217, 95, 48), QColor(44, 127, 184), QColor(49, 150, 84),
                                        QColor(136, 86, 167), QColor(196, 138, 20)};
 

@@ -45,7 +45,7 @@ struct OverlayContent {
     double hover_radius = 0;
     std::optional<QLineF> pull; ///< from the point held to the pointer
     struct Knob {
-        GizmoPart part;
+        WarpKind part;
         QPolygonF line;
         QPointF at;
         bool has_tip = false, is_hot = false;

@@ -13,12 +13,11 @@ namespace {
 
 /// Numbers that the library's functions take, whatever a control came up with.
 Warps within_range(Warps warps, const Warps& otherwise) {
-    const auto is_factor = [](double value) { return std::isfinite(value) && value > 0; };
-    if (!is_factor(warps.stretch)) warps.stretch = otherwise.stretch;
-    if (!is_factor(warps.squeeze)) warps.squeeze = otherwise.squeeze;
-    if (!is_factor(warps.taper)) warps.taper = otherwise.taper;
-    if (!std::isfinite(warps.bend)) warps.bend = otherwise.bend;
-    if (!std::isfinite(warps.twist)) warps.twist = otherwise.twist;
+    for (const WarpInfo& info : warp_infos()) {
+        if (info.amount == nullptr) continue;
+        double& amount = warps.*info.amount;
+        if (!std::isfinite(amount) || (info.is_factor && amount <= 0)) amount = otherwise.*info.amount;
+    }
     return warps;
 }
 

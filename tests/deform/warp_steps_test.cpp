@@ -29,6 +29,18 @@ TEST(WarpSteps, PartsGoFromNothingToAll) {
     EXPECT_EQ((WarpStep{WarpKind::taper, 3}).part(0.5).amount, 2);
 }
 
+TEST(WarpInfos, HaveARowForEachKindInItsOrder) {
+    const std::span<const WarpInfo> infos = warp_infos();
+    ASSERT_EQ(infos.size(), static_cast<std::size_t>(WarpKind::random) + 1);
+    Warps one_slider_each;
+    for (std::size_t k = 0; k < infos.size(); ++k) {
+        EXPECT_EQ(infos[k].kind, static_cast<WarpKind>(k)) << infos[k].name;
+        if (infos[k].amount == nullptr) continue;
+        EXPECT_EQ(one_slider_each.*infos[k].amount, infos[k].nothing()) << infos[k].name;
+        one_slider_each.*infos[k].amount = -1; // so that a second row with this member would fail
+    }
+}
+
 TEST(Warps, AreStepsInAFixedOrder) {
     EXPECT_EQ(make_warp(Warps(), kTallBox), nullptr);
     EXPECT_EQ(make_warp(Warps{.bend = 30}, Box()), nullptr);

@@ -17,19 +17,19 @@ TEST(WarpGizmo, KnobsFollowThePointer) {
     const CameraPoints points{corners};
     const Camera camera = fit_camera(std::span(&points, 1), Vec3d(0.4, 0.3, 1), Vec3d::UnitY(), 1);
     const PictureSize size = {400, 400};
-    for (const GizmoPart part :
-         {GizmoPart::stretch, GizmoPart::squeeze, GizmoPart::bend, GizmoPart::twist, GizmoPart::taper}) {
+    for (const WarpKind part :
+         {WarpKind::stretch, WarpKind::squeeze, WarpKind::bend, WarpKind::twist, WarpKind::taper}) {
         const auto knob = [&](const Warps& warps) {
             for (const GizmoShape& shape : gizmo_shapes(warps, box))
                 if (shape.part == part) return camera.project(shape.knob, size.width, size.height);
             return Vec3d(Vec3d::Zero());
         };
         Warps wanted;
-        if (part == GizmoPart::stretch) wanted.stretch = 1.3;
-        if (part == GizmoPart::squeeze) wanted.squeeze = 0.8;
-        if (part == GizmoPart::bend) wanted.bend = 30;
-        if (part == GizmoPart::twist) wanted.twist = 40;
-        if (part == GizmoPart::taper) wanted.taper = 1.4;
+        if (part == WarpKind::stretch) wanted.stretch = 1.3;
+        if (part == WarpKind::squeeze) wanted.squeeze = 0.8;
+        if (part == WarpKind::bend) wanted.bend = 30;
+        if (part == WarpKind::twist) wanted.twist = 40;
+        if (part == WarpKind::taper) wanted.taper = 1.4;
         const Vec3d from = knob({}), to = knob(wanted);
         ASSERT_GT((to - from).head<2>().norm(), 3) << static_cast<int>(part);
         GizmoDrag drag(part, {}, box, camera, from.x(), from.y(), size);
@@ -53,7 +53,7 @@ TEST(WarpGizmo, IsFoundByItsKnobAndKeepsToTheRanges) {
         EXPECT_FALSE(gizmo_at(shapes, camera, at.x() + 300, at.y() + 300, size, 5));
     }
     const Vec3d top = camera.project(shapes[0].knob, size.width, size.height);
-    GizmoDrag stretch(GizmoPart::stretch, {}, box, camera, top.x(), top.y(), size);
+    GizmoDrag stretch(WarpKind::stretch, {}, box, camera, top.x(), top.y(), size);
     EXPECT_EQ(stretch.moved_to(top.x(), top.y()), Warps());
     EXPECT_EQ(stretch.moved_to(top.x(), top.y() - 1e5).stretch, Warps::kMostFactor);
     EXPECT_EQ(stretch.moved_to(top.x(), 399).stretch, Warps::kLeastFactor);

@@ -307,7 +307,7 @@ TEST(Pointer, GizmosDragTheWarps) {
         const QPoint at = stand.viewport->place_of(shape.knob).toPoint();
         ASSERT_TRUE(stand.viewport->rect().contains(at));
         QPointF way = stand.viewport->place_of(shape.line.back()) - stand.viewport->place_of(shape.line.front());
-        if (shape.part == GizmoPart::twist) {
+        if (shape.part == WarpKind::twist) {
             const QPointF next = stand.viewport->place_of(shape.line[2]);
             way = next - stand.viewport->place_of(shape.knob);
         }

@@ -3,6 +3,7 @@
 #include "actions.h"
 #include "panel.h"
 #include "pins.h"
+#include "words.h"
 
 namespace filigree::studio {
 namespace {
@@ -43,27 +44,24 @@ public:
             [this](const Warps& to, const std::string& merge) { this->workbench().set_warps(to, merge); }};
         choice(rows, warps.setting("deform.axis", "Axis", "The axis that all five go along", field(&Warps::axis)),
                {"x", "y", "z"});
-        const NumberSpec factor = {.least = Warps::kLeastFactor,
-                                   .most = Warps::kMostFactor,
-                                   .decimals = 2,
-                                   .unit = "×",
-                                   .logarithmic = true,
-                                   .digits = 3,
-                                   .neutral = 1};
-        const auto angle = [](double most, double step) {
-            return NumberSpec{.least = -most, .most = most, .step = step, .decimals = 0, .unit = "°", .neutral = 0};
-        };
-        const auto add = [&](const char* name, const char* label, double Warps::*member, const NumberSpec& how,
-                             const char* tooltip) {
-            number(rows, warps.setting(name, label, tooltip, field(member)), how);
-        };
-        add("deform.stretch", "Stretch", &Warps::stretch, factor, "Longer along the axis; a factor");
-        add("deform.squeeze", "Squeeze", &Warps::squeeze, factor,
-            "Longer along the axis and thinner across, the volume stays; a factor");
-        add("deform.bend", "Bend", &Warps::bend, angle(Warps::kMostBend, 1), "Into an arc from end to end, degrees");
-        add("deform.twist", "Twist", &Warps::twist, angle(Warps::kMostTwist, 5),
-            "Turned about the axis from end to end, degrees");
-        add("deform.taper", "Taper", &Warps::taper, factor, "Size of the far end, as a factor of the near end's");
+        for (const WarpInfo& info : warp_infos()) {
+            if (info.amount == nullptr) continue;
+            const NumberSpec factor = {.least = 1 / info.most,
+                                       .most = info.most,
+                                       .decimals = 2,
+                                       .unit = "×",
+                                       .logarithmic = true,
+                                       .digits = 3,
+                                       .neutral = 1};
+            const NumberSpec angle = {
+                .least = -info.most, .most = info.most, .step = info.step, .decimals = 0, .unit = "°", .neutral = 0};
+            const std::string name(info.name);
+            number(rows,
+                   warps.setting(QString::fromStdString("deform." + name), title_of(name),
+                                 QString::fromUtf8(info.action.data(), qsizetype(info.action.size())),
+                                 field(info.amount)),
+                   info.is_factor ? factor : angle);
+        }
         beside(rows, {button("deform.reset", "edit.reset_deformation", "Reset all")});
         refresh();
     }

@@ -1,6 +1,8 @@
 // The knobs of the deformations in the picture, there while the tool Pull is in hand.
 #include "tools/tool.h"
 
+#include "words.h"
+
 #include "filigree/present/warp_gizmo.h"
 
 #include <algorithm>
@@ -13,21 +15,11 @@ constexpr double kKnobRadius = 9;  // pixels around a gizmo's knob that take hol
 constexpr double kKnobMargin = 16; // pixels between an arrow's knob and the picture's border
 
 /// "Bend 35°".
-QString gizmo_label(GizmoPart part, const Warps& warps) {
-    const auto factor = [](double value) { return QString::fromUtf8("× %1").arg(value, 0, 'f', 2); };
-    const auto degrees = [](double value) { return QString::fromUtf8("%1°").arg(value, 0, 'f', 0); };
-    switch (part) {
-    case GizmoPart::stretch:
-        return "Stretch " + factor(warps.stretch);
-    case GizmoPart::squeeze:
-        return "Squeeze " + factor(warps.squeeze);
-    case GizmoPart::bend:
-        return "Bend " + degrees(warps.bend);
-    case GizmoPart::twist:
-        return "Twist " + degrees(warps.twist);
-    default:
-        return "Taper " + factor(warps.taper);
-    }
+QString gizmo_label(WarpKind part, const Warps& warps) {
+    const WarpInfo& info = warp_infos()[static_cast<std::size_t>(part)];
+    const double amount = warps.*info.amount;
+    return title_of(std::string(info.name)) + (info.is_factor ? QString::fromUtf8(" × %1").arg(amount, 0, 'f', 2)
+                                                              : QString::fromUtf8(" %1°").arg(amount, 0, 'f', 0));
 }
 
 class GizmoTool : public Tool {
@@ -110,13 +102,13 @@ private:
         return shapes;
     }
 
-    std::optional<GizmoPart> part_at(const QPointF& point) const {
+    std::optional<WarpKind> part_at(const QPointF& point) const {
         const QPointF at = context_.camera.in_tile(point);
         return gizmo_at(shapes(), context_.camera.camera(), at.x(), at.y(), context_.camera.tile_size(), kKnobRadius);
     }
 
     std::optional<GizmoDrag> drag_;
-    std::optional<GizmoPart> part_;      ///< that was last under the mouse, or is dragged
+    std::optional<WarpKind> part_;       ///< that was last under the mouse, or is dragged
     std::shared_ptr<const Model> model_; ///< there when the drag began
     int step_ = 0;                       ///< of the history then
 };

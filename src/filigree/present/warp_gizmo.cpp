@@ -55,7 +55,7 @@ Vec3d across(const Vec3d& direction, const Vec3d& axis) {
     return (direction - direction.dot(axis) * axis).normalized();
 }
 
-GizmoShape arrow(GizmoPart part, const Vec3d& from, const Vec3d& direction, double length) {
+GizmoShape arrow(WarpKind part, const Vec3d& from, const Vec3d& direction, double length) {
     return {part, {from, from + length * direction}, from + length * direction, true};
 }
 
@@ -97,32 +97,32 @@ std::vector<GizmoShape> gizmo_shapes(const Warps& warps, const Box& rest_box, co
     const double gap = kGap * frame.diagonal, length = kArrow * frame.diagonal;
 
     const Vec3d end = frame.turn(frame.high(), frame.axis);
-    shapes.push_back(arrow(GizmoPart::stretch, frame.place(frame.high()) + gap * end, end, length));
+    shapes.push_back(arrow(WarpKind::stretch, frame.place(frame.high()) + gap * end, end, length));
 
     const Vec3d middle = frame.centre + frame.outer();
     const Vec3d out = frame.turn(middle, frame.third);
-    shapes.push_back(arrow(GizmoPart::squeeze, frame.place(middle) + gap * out, out, length));
+    shapes.push_back(arrow(WarpKind::squeeze, frame.place(middle) + gap * out, out, length));
 
     const Vec3d corner = frame.high() + frame.outer();
     const Vec3d sideways = frame.turn(corner, frame.third);
-    shapes.push_back(arrow(GizmoPart::taper, frame.place(corner) + gap * sideways, sideways, length));
+    shapes.push_back(arrow(WarpKind::taper, frame.place(corner) + gap * sideways, sideways, length));
 
     const BendCircle bend(frame, warps);
     constexpr double kReach = 0.30; // of an arc to both sides of its knob, radians
     shapes.push_back(
-        {GizmoPart::bend,
+        {WarpKind::bend,
          arc(bend.centre, bend.from, bend.towards, bend.radius, bend.angle - kReach, bend.angle + kReach),
          bend.centre + bend.radius * (std::cos(bend.angle) * bend.from + std::sin(bend.angle) * bend.towards), false});
 
     const TwistRing twist(frame);
-    shapes.push_back({GizmoPart::twist, arc(twist.centre, twist.from, twist.towards, twist.radius, 0, 2 * kPi),
+    shapes.push_back({WarpKind::twist, arc(twist.centre, twist.from, twist.towards, twist.radius, 0, 2 * kPi),
                       twist.centre + twist.radius * twist.from, false});
     return shapes;
 }
 
-std::optional<GizmoPart> gizmo_at(std::span<const GizmoShape> shapes, const Camera& camera, double x, double y,
-                                  const PictureSize& size, double radius) {
-    std::optional<GizmoPart> found;
+std::optional<WarpKind> gizmo_at(std::span<const GizmoShape> shapes, const Camera& camera, double x, double y,
+                                 const PictureSize& size, double radius) {
+    std::optional<WarpKind> found;
     double best = radius;
     for (const GizmoShape& shape : shapes) {
         const Vec3d at = camera.project(shape.knob, size.width, size.height);
@@ -134,7 +134,7 @@ std::optional<GizmoPart> gizmo_at(std::span<const GizmoShape> shapes, const Came
     return found;
 }
 
-GizmoDrag::GizmoDrag(GizmoPart part, const Warps& start, const Box& rest_box, const Camera& camera, double x, double y,
+GizmoDrag::GizmoDrag(WarpKind part, const Warps& start, const Box& rest_box, const Camera& camera, double x, double y,
                      const PictureSize& size)
     : part_(part), start_(start), camera_(camera), size_(size), press_x_(x), press_y_(y) {
     const WarpFrame frame(start, rest_box, camera.eye - camera.target);
@@ -144,16 +144,16 @@ GizmoDrag::GizmoDrag(GizmoPart part, const Warps& start, const Box& rest_box, co
         length_ = std::max((centre_ - frame.place(from)).norm(), 1e-6 * frame.diagonal);
     };
     switch (part) {
-    case GizmoPart::stretch:
+    case WarpKind::stretch:
         follow_line(frame.high(), frame.centre, frame.axis);
         break;
-    case GizmoPart::squeeze:
+    case WarpKind::squeeze:
         follow_line(frame.centre + frame.outer(), frame.centre, frame.third);
         break;
-    case GizmoPart::taper:
+    case WarpKind::taper:
         follow_line(frame.high() + frame.outer(), frame.high(), frame.third);
         break;
-    case GizmoPart::bend: {
+    case WarpKind::bend: {
         const BendCircle circle(frame, start);
         centre_ = circle.centre;
         along_ = circle.from;
@@ -161,7 +161,7 @@ GizmoDrag::GizmoDrag(GizmoPart part, const Warps& start, const Box& rest_box, co
         look_at_circle(circle.angle, circle.radius);
         break;
     }
-    case GizmoPart::twist: {
+    case WarpKind::twist: {
         const TwistRing ring(frame);
         centre_ = ring.centre;
         along_ = ring.from;
@@ -169,8 +169,10 @@ GizmoDrag::GizmoDrag(GizmoPart part, const Warps& start, const Box& rest_box, co
         look_at_circle(0, ring.radius);
         break;
     }
+    case WarpKind::random: // has no handle
+        break;
     }
-    if (part == GizmoPart::bend || part == GizmoPart::twist)
+    if (part == WarpKind::bend || part == WarpKind::twist)
         last_angle_ = angle_at(x, y);
     else
         grabbed_ = distance_at(x, y);
@@ -209,12 +211,12 @@ void GizmoDrag::look_at_circle(double angle, double radius) {
 Warps GizmoDrag::moved_to(double x, double y) {
     Warps warps = start_;
     const auto factor = [](double value) { return std::clamp(value, Warps::kLeastFactor, Warps::kMostFactor); };
-    if (part_ == GizmoPart::bend || part_ == GizmoPart::twist) {
+    if (part_ == WarpKind::bend || part_ == WarpKind::twist) {
         const double angle = angle_at(x, y);
         turned_ += std::remainder(angle - last_angle_, 2 * kPi); // step by step, so that it may go round
         last_angle_ = angle;
         const double degrees = turned_ * 180 / kPi;
-        if (part_ == GizmoPart::bend)
+        if (part_ == WarpKind::bend)
             warps.bend = std::clamp(std::round(start_.bend + 4 * degrees), -Warps::kMostBend, Warps::kMostBend);
         else
             warps.twist = std::clamp(std::round(start_.twist + 2 * degrees), -Warps::kMostTwist, Warps::kMostTwist);
@@ -222,9 +224,9 @@ Warps GizmoDrag::moved_to(double x, double y) {
     }
     const double scale = std::max(1 + (distance_at(x, y) - grabbed_) / length_, 0.05);
     const auto rounded = [](double value) { return std::round(100 * value) / 100; };
-    if (part_ == GizmoPart::stretch) warps.stretch = factor(rounded(start_.stretch * scale));
-    if (part_ == GizmoPart::squeeze) warps.squeeze = factor(rounded(start_.squeeze / (scale * scale)));
-    if (part_ == GizmoPart::taper) warps.taper = factor(rounded(start_.taper * scale));
+    if (part_ == WarpKind::stretch) warps.stretch = factor(rounded(start_.stretch * scale));
+    if (part_ == WarpKind::squeeze) warps.squeeze = factor(rounded(start_.squeeze / (scale * scale)));
+    if (part_ == WarpKind::taper) warps.taper = factor(rounded(start_.taper * scale));
     return warps;
 }
 

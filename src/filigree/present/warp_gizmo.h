@@ -1,4 +1,4 @@
-// Handles in a view for stretch, squeeze, bend, twist and taper: where they are, and what dragging them does.
+// Handles in a view for the warps that have a slider: where they are, and what dragging them does.
 #pragma once
 
 #include "filigree/deform/warp_steps.h"
@@ -10,11 +10,9 @@
 
 namespace filigree {
 
-enum class GizmoPart { stretch, squeeze, bend, twist, taper };
-
 /// One handle, in the world: a line (an arrow or an arc) with the knob that is dragged.
 struct GizmoShape {
-    GizmoPart part;
+    WarpKind part;
     std::vector<Vec3d> line;
     Vec3d knob;
     bool has_tip = false; ///< the line ends as an arrow at the knob
@@ -26,15 +24,15 @@ std::vector<GizmoShape> gizmo_shapes(const Warps& warps, const Box& rest_box,
                                      const Vec3d& towards_viewer = Vec3d::Zero());
 
 /// The handle whose knob is within `radius` pixels of a point, the nearest to it.
-std::optional<GizmoPart> gizmo_at(std::span<const GizmoShape> shapes, const Camera& camera, double x, double y,
-                                  const PictureSize& size, double radius);
+std::optional<WarpKind> gizmo_at(std::span<const GizmoShape> shapes, const Camera& camera, double x, double y,
+                                 const PictureSize& size, double radius);
 
 /// A handle that is held. The values stay in the ranges that Warps names.
 class GizmoDrag {
 public:
-    GizmoDrag(GizmoPart part, const Warps& start, const Box& rest_box, const Camera& camera, double x, double y,
+    GizmoDrag(WarpKind part, const Warps& start, const Box& rest_box, const Camera& camera, double x, double y,
               const PictureSize& size);
-    GizmoPart part() const { return part_; }
+    WarpKind part() const { return part_; }
     /// The warps with the pointer there.
     Warps moved_to(double x, double y);
 
@@ -43,7 +41,7 @@ private:
     double angle_at(double x, double y) const;
     double distance_at(double x, double y) const;
 
-    GizmoPart part_;
+    WarpKind part_;
     Warps start_;
     Camera camera_;
     PictureSize size_;
