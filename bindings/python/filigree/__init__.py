@@ -82,6 +82,7 @@ from ._core import (
     write_model,
     write_picture,
 )
+from ._version import __version__ as __version__
 
 __all__ = [
     "Actor",

@@ -3,6 +3,7 @@
 import doctest
 import inspect
 import os
+import re
 import subprocess
 import sys
 import warnings
@@ -26,6 +27,11 @@ NAMED = [(thing.__name__, thing) for thing in CODE] + METHODS
 
 def test_everything_public_is_named():
     assert sorted(filigree.__all__) == [name for name in dir(filigree._core) if not name.startswith("_")]
+
+
+def test_the_version_is_cmakes():
+    cmake = (Path(__file__).resolve().parents[3] / "CMakeLists.txt").read_text()
+    assert filigree.__version__ == re.search(r"project\(filigree VERSION ([0-9.]+)", cmake).group(1)
 
 
 @pytest.mark.parametrize("name, thing", NAMED, ids=[name for name, _ in NAMED])
