@@ -58,7 +58,7 @@ struct PackReport {
     bool lacks_level_attributes = false;
 };
 
-/// Writes a model in few bytes (docs/coding.md). Positions are rounded; vertices and faces get an order of their own
+/// Writes a model in few bytes (docs/packing.md). Positions are rounded; vertices and faces get an order of their own
 /// unless PackOptions::keep_order. The driver keeps its vertices and their order, so poses fit as before. Poses are
 /// packed too: 1e-5 of the diagonal (rms), gradients 1e-3. Levels between the driver and the mesh are dropped; reading
 /// binds the vertices anew. poses: may be empty. Cost O(size log size), about 0.6 processor seconds a million vertices.

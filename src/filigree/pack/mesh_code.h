@@ -1,4 +1,4 @@
-// Whole meshes in few bits: faces, places, attributes, each in a stream of its own. docs/coding.md says what it rests
+// Whole meshes in few bits: faces, places, attributes, each in a stream of its own. docs/packing.md says what it rests
 // on.
 #pragma once
 
