@@ -19,7 +19,7 @@ endif()
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME filigree)
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
-set(CPACK_PACKAGE_CONTACT "The Filigree developers")
+set(CPACK_PACKAGE_CONTACT "The Filigree authors")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
 set(CPACK_RESOURCE_FILE_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
@@ -39,7 +39,7 @@ set(CPACK_DEBIAN_PROGRAMS_DESCRIPTION "${PROJECT_DESCRIPTION}: the programs fili
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_RECOMMENDS "ffmpeg, fonts-dejavu-core")
 set(CPACK_COMPONENT_PROGRAMS_DEPENDS library)
 
-set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME libfiligree0)
+set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME libfiligree${filigree_soversion})
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libs)
 set(CPACK_DEBIAN_LIBRARY_DESCRIPTION "${PROJECT_DESCRIPTION}: the library")
 
@@ -60,5 +60,15 @@ if(TARGET filigree_python)
       "python3 (>= 3.${Python3_VERSION_MINOR}), python3 (<< 3.${next_python}), python3-numpy")
   set(CPACK_COMPONENT_PYTHON_DEPENDS library)
 endif()
+
+# Our licence, and those of the libraries whose headers are compiled in, which scripts/package collects.
+foreach(component IN LISTS CPACK_COMPONENTS_ALL)
+  string(TOUPPER ${component} upper)
+  set(folder ${CMAKE_INSTALL_DATADIR}/doc/${CPACK_DEBIAN_${upper}_PACKAGE_NAME})
+  install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${folder} RENAME copyright COMPONENT ${component})
+  if(NOT component STREQUAL development) # which has no binary
+    install(DIRECTORY ${PROJECT_BINARY_DIR}/licences/ DESTINATION ${folder}/licences COMPONENT ${component} OPTIONAL)
+  endif()
+endforeach()
 
 include(CPack)

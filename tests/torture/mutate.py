@@ -99,7 +99,7 @@ class Library:
         self.commands = {entry["file"]: entry["command"] for entry in json.loads((single / "compile_commands.json").read_text())}
         objects = [self.object_of(file) for file in self.commands if self.layer_of(file) in LAYERS]
         subprocess.run(["cmake", "--build", str(single), "--target", *objects], check=True, stdout=subprocess.DEVNULL)
-        made = run(["ninja", "-C", release, "-t", "commands", "src/filigree/libfiligree.so.0.1.0"], text=True, check=True)
+        made = run(["ninja", "-C", release, "-t", "commands", "src/filigree/libfiligree.so"], text=True, check=True)
         link = next(line for line in made.stdout.splitlines() if " -shared " in line).split("&&")[1]
         words = shlex.split(link)
         of_layers = re.compile("|".join(f"unity_{layer}_" for layer in LAYERS))
@@ -124,7 +124,8 @@ class Library:
             return False
         objects = [made if name == self.object_of(str(path)) else place for name, place in self.objects.items()]
         words = list(self.link)
-        words[self.output] = folder / "libfiligree.so.0"
+        name = next(word for word in words if word.startswith("-Wl,-soname,")).rpartition(",")[2]
+        words[self.output] = folder / name
         run([*words, *objects], cwd=self.release, check=True)
         return True
 

@@ -66,8 +66,9 @@ def package_files(folder):
             run("cmake", "--install", folder, "--component", component, "--prefix", prefix, "--strip")
         module = next(Path(prefix).rglob("filigree/__init__.py")).parent
         files = {f"filigree/{path.name}": path.read_bytes() for path in module.iterdir() if path.is_file()}
-        for library in Path(prefix).rglob("libfiligree*.so.0"):  # by the names that they are linked under
-            files[f"filigree/{library.name}"] = library.read_bytes()
+        for library in Path(prefix).rglob("libfiligree*.so.*"):
+            if library.is_symlink():  # by the names that they are linked under
+                files[f"filigree/{library.name}"] = library.read_bytes()
     if not any(f"-{sys.version_info.major}{sys.version_info.minor}-" in name for name in files):
         sys.exit(f"{folder} is built for another Python than {sys.version.split()[0]}; give --config-settings build=FOLDER")
     return files
