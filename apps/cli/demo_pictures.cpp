@@ -13,7 +13,8 @@ namespace filigree::cli {
 
 namespace {
 
-constexpr unsigned kPanelWidth = 460, kPanelHeight = 440;
+constexpr unsigned kPanelWidth = 240, kPanelHeight = 240, kPixels = 2; // kPixels for each unit of the page: captions
+                                                                       // stay readable where the picture is scaled down
 constexpr unsigned kFilmWidth = 640, kFilmHeight = 480, kFilmFrames = 30, kFilmPasses = 8;
 constexpr std::size_t kMostFilmTriangles = 150'000;
 
@@ -35,16 +36,16 @@ void draw_demo(const DemoScene& scene, HeadlessRenderer& renderer, const std::st
                  moved = camera_around(std::span(&after, 1), scene.up, aspect);
     const HeatMap errors = heat_map(scene.error.vertices->per_vertex, scene.error.diagonal);
 
-    constexpr double kGap = 8, kCaption = 40, kLegend = 130;
-    Page page(5 * kPanelWidth + 4 * kGap + kLegend, kPanelHeight + kCaption);
+    constexpr double kGap = 5, kCaption = 28, kLegend = 110;
+    Page page(4 * kPanelWidth + 3 * kGap + kLegend, kPanelHeight + kCaption);
     unsigned panel = 0;
     const auto add = [&](const Drawable& drawable, const Camera& camera, bool edges, const std::string& caption) {
         const Scene shown{.objects = {{&drawable, {.edges = edges}}}, .up = scene.up};
-        const Picture picture = require(
-            renderer.picture(shown, camera, {.width = kPanelWidth, .height = kPanelHeight, .passes = 16}, context));
+        const PictureOptions size{.width = kPixels * kPanelWidth, .height = kPixels * kPanelHeight, .passes = 16};
+        const Picture picture = require(renderer.picture(shown, camera, size, context));
         const Point corner(panel++ * (kPanelWidth + kGap), 0);
         page.picture(picture, corner, kPanelWidth, kPanelHeight);
-        page.text(caption, corner + Point(kPanelWidth / 2.0, kPanelHeight + 26), {.size = 16, .align = Align::centre});
+        page.text(caption, corner + Point(kPanelWidth / 2.0, kPanelHeight + 18), {.size = 14, .align = Align::centre});
     };
     {
         const Drawable mesh = require(Drawable::surface(scene.mesh, {}, context));
@@ -52,9 +53,8 @@ void draw_demo(const DemoScene& scene, HeadlessRenderer& renderer, const std::st
     }
     {
         Drawable drawable = require(Drawable::model(scene.model, {.level = 0}, {}, context));
-        add(drawable, at_rest, true, fmt::format("driver: {}", with_commas(scene.model.driver().vertices.size())));
         require(drawable.set_pose(scene.pose, context));
-        add(drawable, moved, true, "driver, deformed");
+        add(drawable, moved, true, fmt::format("driver: {}, moved", with_commas(scene.model.driver().vertices.size())));
     }
     Drawable restored = require(Drawable::model(scene.model, {}, {}, context));
     require(restored.set_pose(scene.pose, context));
@@ -62,11 +62,11 @@ void draw_demo(const DemoScene& scene, HeadlessRenderer& renderer, const std::st
     const ScalarColors scalars{errors.values, ColorMap::sequential, errors.range};
     restored = require(Drawable::model(scene.model, {}, {.scalars = scalars}, context));
     require(restored.set_pose(scene.pose, context));
-    add(restored, moved, false, "distance from the full deformation");
+    add(restored, moved, false, "error");
     page.legend(ColorMap::sequential, errors.range, "distance / diagonal", {page.width() - kLegend + 14, 20},
-                kPanelHeight - 40.0);
+                kPanelHeight - 30.0);
     if (context.is_cancelled()) throw Failure{cancelled_error()};
-    require(page.write(path, 1));
+    require(page.write(path, kPixels));
 }
 
 void film_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_at, HeadlessRenderer& renderer,
