@@ -70,8 +70,8 @@ void report_export(const ExportReport& exported, bool is_skin, bool has_normals,
                "as", is_skin ? "skin" : "morph");
     if (exported.moments_checked > 0) report.row("error of the file", error_text(exported, is_skin));
     if (has_normals && exported.normal_error_degrees > 0)
-        report.row("normals", fmt::format("up to {:.3g} degrees off (95th percentile) in viewers that turn them with "
-                                          "the skin's matrix, such as three.js; in Blender import with Shading: Smooth",
+        report.row("normals", fmt::format("95 % are off by less than {:.3g} degrees in viewers such as three.js; in "
+                                          "Blender, import with Shading: Smooth (docs/exchange.md)",
                                           exported.normal_error_degrees));
     report.set("vertices", exported.vertices);
     report.set("joints", exported.joints);
@@ -113,23 +113,26 @@ void write_numbered(const Restorer& restorer, const FrameSource<Pose>& poses, co
 OptionList animation_options(AnimationOutput& output) {
     return {
         choice<GlbMotion>("--as", output.glb, {{"skin", GlbMotion::skin}, {"morph", GlbMotion::morph}},
-                          "GLB: a skin, one joint a driver vertex, or morph targets, every frame's positions (unset: a "
-                          "skin where the model's code makes one)"),
-        Option("--key-rate", output.skin.key_rate, "Skin: keys a second (unset: one a frame; what melts: 10)")
+                          "GLB: skin (a joint for each driver vertex) or morph (morph targets: the positions of every "
+                          "frame). Default: skin for a model, morph for a mesh"),
+        Option("--key-rate", output.skin.key_rate,
+               "Skin: keys per second (default: one per frame; for bodies that melt: 10)")
             .above_zero(),
-        choice<KeyInterpolation>("--interpolation", output.skin.interpolation,
-                                 {{"linear", KeyInterpolation::linear}, {"cubic", KeyInterpolation::cubic}},
-                                 "Skin: between keys (unset: linear; cubic needs fewer keys, but Blender ignores it)"),
+        choice<KeyInterpolation>(
+            "--interpolation", output.skin.interpolation,
+            {{"linear", KeyInterpolation::linear}, {"cubic", KeyInterpolation::cubic}},
+            "Skin: interpolation between keys (default: linear). Cubic needs fewer keys; Blender ignores it"),
         choice<unsigned>("--influences", output.skin.influences, {{"3", 3U}, {"6", 6U}},
-                         "Skin: joints a vertex (unset: 3, which plays in everything; 6 shows Blender the true rest "
-                         "shape)"),
-        Option("--full-precision", output.skin.full_precision, "Skin: float rotations and weights"),
+                         "Skin: joints per vertex (default: 3, for every viewer). 6 is for Blender: the file then has "
+                         "the true rest shape"),
+        Option("--full-precision", output.skin.full_precision,
+               "Skin: rotations and weights as floats, not as 16-bit numbers"),
         Option("--compress", output.compress,
-               "GLB: packed for the web (EXT_meshopt_compression, KHR_mesh_quantization), which viewers have to know"),
-        Option("--all-levels", output.skin.all_levels, "Skin: coarser levels too (MSFT_lod)"),
+               "GLB: packed for the web; the viewer needs EXT_meshopt_compression and KHR_mesh_quantization"),
+        Option("--all-levels", output.skin.all_levels, "Skin: also write the coarser levels (MSFT_lod)"),
         Option("--no-normals", output.no_normals,
-               "GLB: leave normals out; viewers then shade flat, which is right under any stretch"),
-        Option("--morph-normals", output.morph.morph_normals, "Morph targets: normals of each frame too")};
+               "GLB: write no normals. Viewers then shade flat, which is right under stretch too"),
+        Option("--morph-normals", output.morph.morph_normals, "Morph targets: also write the normals of every frame")};
 }
 
 std::string given_animation_option(const Session& session) {
@@ -173,14 +176,14 @@ void check_not_input(const std::string& output, const std::vector<std::string>& 
 
 Option pose_up_option(PoseFileOptions& options) {
     return choice<UpAxis>("--pose-up", options.up, {{"y", UpAxis::y}, {"z", UpAxis::z}},
-                          "Axis that is up in the file of poses, where it is the other one in the model: turns them");
+                          "Up axis of the pose file, if it is not the model's; the poses are turned");
 }
 
 OptionList pose_file_options(PoseFileOptions& options) {
     return {Option("--frame-rate", options.frames_per_second,
-                   "Frames a second (unset: as the file says; 60 for .pc2 and numbered meshes)")
+                   "Frames per second (default: that of the file; 60 for .pc2, .glb and numbered meshes)")
                 .above_zero(),
-            Option("--animation", options.animation, "Of a .glb with several (unset: the first)"),
+            Option("--animation", options.animation, "Name of the animation in a .glb (default: the first)"),
             pose_up_option(options)};
 }
 

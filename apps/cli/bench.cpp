@@ -121,17 +121,19 @@ void run(const BenchArguments& options, Session& session) {
 Command bench_command() {
     const auto options = std::make_shared<BenchArguments>();
     return {.name = "bench",
-            .text = "Measure this machine: speeds with their rivals, and fidelity",
+            .text = "Measure speed on this machine, beside other methods, and fidelity",
             .options =
                 {Option("name", options->measure.name, "What to measure").one_of(bench::measure_names()).with_default(),
                  Option("--mesh", options->mesh,
-                        fmt::format("Mesh to measure on (unset: the wavy cube with {} vertices); estimate, drivers and "
-                                    "goals take a folder of meshes too (unset: six built-in shapes)",
+                        fmt::format("Mesh to measure (default: the wavy cube with {} vertices). For estimate, drivers "
+                                    "and goals also a folder of meshes (default: six built-in shapes)",
                                     with_commas(wavy_cube_vertices(kBenchResolution)))),
-                 Option("--base", options->measure.base, "Vertices of the driver (unset: as strip chooses)"),
-                 Option("--particles", options->measure.particles, "Particles of the bodies (unset: 1,000 to 200,000)")
+                 Option("--base", options->measure.base, "Vertices of the driver (default: as for strip)"),
+                 Option("--particles", options->measure.particles,
+                        "Number of particles of simulate (default: several, from 1,000 to 200,000)")
                      .between(8, 1000000),
-                 Option("--poses", options->measure.poses, "Random poses of estimate (1,000)").between(1, 1000000)},
+                 Option("--poses", options->measure.poses, "Number of random poses of estimate (default: 1,000)")
+                     .between(1, 1000000)},
             .examples = "  filigree bench restore --threads 1\n"
                         "  filigree bench fidelity --mesh scan.ply --base 1000\n"
                         "  filigree bench drivers --mesh scans/\n"

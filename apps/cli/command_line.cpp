@@ -156,7 +156,8 @@ std::string sentence_of(const CLI::App& command, const CLI::ParseError& error, c
 
 int say_usage(const std::string& program, const std::string& command, std::string sentence) {
     std::replace(sentence.begin(), sentence.end(), '\n', ' ');
-    const std::string where = "'" + program + (command.empty() ? "" : " " + command) + " --help' says what there is.";
+    const std::string where = command.empty() ? "'" + program + " --help' lists the commands."
+                                              : "'" + program + " " + command + " --help' lists the options.";
     say(program + ": " + sentence + (sentence.ends_with('?') ? " " : "; ") + where);
     return static_cast<int>(ErrorCode::usage);
 }

@@ -87,22 +87,24 @@ void run(const CompareArguments& options, Session& session) {
 
 Command compare_command() {
     const auto options = std::make_shared<CompareArguments>();
-    return {.name = "compare",
-            .text = "Say how far one mesh is from another",
-            .options =
-                {Option("a", options->a, "Mesh").is_read().required(),
-                 Option("b", options->b, "Mesh to measure against; fractions are of its diagonal").is_read().required(),
-                 Option("--samples", options->samples, "Points on each surface, besides its vertices")
-                     .whole_from(0)
-                     .with_default(),
-                 Option("--picture", options->picture,
-                        "Also draw the first mesh coloured by its distance from the second (.png, .svg, .pdf)")
-                     .is_written(),
-                 found_up_option(options->up)},
-            .examples = "  filigree compare restored.ply full.ply\n"
-                        "  filigree compare restored.ply full.ply --picture heat.png\n"
-                        "  filigree compare driver.ply scan.ply --json",
-            .run = [options](Session& session) { run(*options, session); }};
+    return {
+        .name = "compare",
+        .text = "Measure how far one mesh is from another",
+        .options = {Option("a", options->a, "Mesh").is_read().required(),
+                    Option("b", options->b, "Mesh to compare with; relative distances are fractions of its diagonal")
+                        .is_read()
+                        .required(),
+                    Option("--samples", options->samples, "Sample points on each surface, in addition to the vertices")
+                        .whole_from(0)
+                        .with_default(),
+                    Option("--picture", options->picture,
+                           "Also draw the first mesh, coloured by its distance from the second (.png, .svg, .pdf)")
+                        .is_written(),
+                    found_up_option(options->up)},
+        .examples = "  filigree compare restored.ply full.ply\n"
+                    "  filigree compare restored.ply full.ply --picture heat.png\n"
+                    "  filigree compare driver.ply scan.ply --json",
+        .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

@@ -140,8 +140,8 @@ void run_demo(const DemoArguments& options, Session& session) {
                                                      seconds_text(restore_seconds)));
     report.row("speed ratio", fmt::format("{:.1f} times", full_seconds / ours));
     report.row("difference, rms", distance_text(with_gradients, d.rms));
-    report.row("normals off by",
-               fmt::format("{:.2g} degrees (95 % of them by less than {:.2g})", d.normal_mean_deg, d.normal_p95_deg));
+    report.row("normals, mean error",
+               fmt::format("{:.2g} degrees; 95 % within {:.2g}", d.normal_mean_deg, d.normal_p95_deg));
     report.row("without gradients", fmt::format("rms {:.2e} of the diagonal, 95 % of normals within {:.2g} degrees",
                                                 positions_only.relative(p.rms), p.normal_p95_deg));
     report.row("files", folder + "/: mesh, driver, driver_bent, restored, full_deformation (.ply), model.fil");
@@ -173,13 +173,13 @@ void run_demo(const DemoArguments& options, Session& session) {
 Command demo_command() {
     const auto options = std::make_shared<DemoArguments>();
     return {.name = "demo",
-            .text = "The main job, start to end: strip, bend and twist the driver, restore, compare",
+            .text = "The main job from start to end: strip, bend and twist the driver, restore, compare",
             .options = {Option("mesh", options->input,
-                               fmt::format("Mesh (unset: the report's wavy cube with {} vertices)",
+                               fmt::format("Mesh (default: a wavy cube with {} vertices)",
                                            with_commas(wavy_cube_vertices(kDemoResolution)))),
                         Option("-o,--output", options->output, "Folder for the meshes, the picture and the film")
                             .with_default(),
-                        Option("--no-pictures", options->no_pictures, "Draw no picture and no film"),
+                        Option("--no-pictures", options->no_pictures, "Make no picture and no film"),
                         found_up_option(options->up)},
             .examples = "  filigree demo\n  filigree demo scan.ply -o out",
             .run = [options](Session& session) { run_demo(*options, session); }};

@@ -210,7 +210,7 @@ Command export_command() {
     const auto options = std::make_shared<ExportArguments>();
     return {
         .name = "export",
-        .text = "Write a model, moving or at rest, for other programs",
+        .text = "Write a model for other programs, moving or at rest",
         .options =
             OptionList{
                 Option("file", options->input, "Model, or a mesh that moves (animated glTF, or with --poses)")
@@ -219,18 +219,21 @@ Command export_command() {
                 output_option(options->output,
                               "GLB (a skin, or levels at rest), .pc2, .mdd, .usda, a folder (NAME/) or NAME_####.ply"),
                 Option("--poses", options->poses,
-                       "What moves the driver (or the mesh): .pc2, .mdd, numbered meshes, an animated glTF, a "
-                       "model; unset: the file's own poses")
+                       "Motion of the driver (or of the mesh): .pc2, .mdd, numbered meshes, an animated glTF, a model "
+                       "(default: the poses in the file)")
                     .is_read()} +
             pose_file_options(options->pose_file) +
-            OptionList{Option("--rest", options->at_rest, "The levels at rest, though the model has poses"),
-                       Option("--web", options->web,
-                              "A folder that shows the model, or a GLB as it is, in a browser, without a network"),
-                       Option("--stream", options->stream,
-                              "The page's model coded, coarse to fine: it is seen and moves from its first bytes on"),
-                       Option("--bits", options->bits, "Of a stream's positions, along the longest side of the box")
-                           .between(10, 16)
-                           .with_default()} +
+            OptionList{
+                Option("--rest", options->at_rest, "Write the levels at rest, even if the model has poses"),
+                Option("--web", options->web,
+                       "Write a folder with a page that shows the model, or a GLB as it is, in a browser; it needs no "
+                       "network"),
+                Option(
+                    "--stream", options->stream,
+                    "With --web: pack the model, coarse to fine; the page shows and moves it from its first bytes on"),
+                Option("--bits", options->bits, "With --stream: bits of a position, along the longest side of the box")
+                    .between(10, 16)
+                    .with_default()} +
             animation_options(options->animation) + restore_options(options->restore),
         .examples = "  filigree export bounce.fil -o bounce.glb\n"
                     "  filigree export bounce.fil -o bounce.glb --key-rate 30 --interpolation cubic\n"

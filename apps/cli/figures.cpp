@@ -96,25 +96,28 @@ void run_figures(const FiguresArguments& options, Session& session) {
 
 Command figures_command() {
     const auto options = std::make_shared<FiguresArguments>();
-    return {.name = "figures",
-            .text = "The report's figures, drawn from what the program computes",
-            .options =
-                {Option("-o,--output", options->output, "Folder for the figures").with_default(),
-                 Option("--only", options->only, "Figures to draw: 1.1, 2.1, ... 3.1, border, codes, scan (unset: all)")
-                     .named("NAME"),
-                 choice<std::string>("--format", options->format, {{"png", "png"}, {"svg", "svg"}, {"pdf", "pdf"}},
-                                     "png (unset), svg or pdf"),
-                 Option("--width", options->width, "Width of a figure in pixels; SVG and PDF: of the pictures in it")
-                     .between(180, 7200)
-                     .with_default(),
-                 Option("--passes", options->passes, "Passes of light in rendered figures (unset: as the mesh needs)")
-                     .between(1, 4096),
-                 Option("--scan", options->scan, "Mesh that figure 'scan' shows (unset: a shape of ours)"),
-                 up_option(options->up, "Which axis of the scan is up (unset: y)")},
-            .examples = "  filigree figures -o figures\n"
-                        "  filigree figures --only 1.1 2.10 --format pdf\n"
-                        "  filigree figures --only scan --scan koala.obj",
-            .run = [options](Session& session) { run_figures(*options, session); }};
+    return {
+        .name = "figures",
+        .text = "Draw the figures of the report Detail-Preserving Animation",
+        .options = {Option("-o,--output", options->output, "Folder for the figures").with_default(),
+                    Option("--only", options->only,
+                           "Figures to draw: 1.1, 2.1, ... 3.1, border, codes, scan (default: all)")
+                        .named("NAME"),
+                    choice<std::string>("--format", options->format, {{"png", "png"}, {"svg", "svg"}, {"pdf", "pdf"}},
+                                        "png (default), svg or pdf"),
+                    Option("--width", options->width,
+                           "Width of a figure in pixels; for SVG and PDF, of the pictures in the figure")
+                        .between(180, 7200)
+                        .with_default(),
+                    Option("--passes", options->passes,
+                           "Number of passes of rendered figures (default: by the size of the mesh)")
+                        .between(1, 4096),
+                    Option("--scan", options->scan, "Mesh for figure 'scan' (default: a built-in shape)"),
+                    up_option(options->up, "Up axis of the scan (default: y)")},
+        .examples = "  filigree figures -o figures\n"
+                    "  filigree figures --only 1.1 2.10 --format pdf\n"
+                    "  filigree figures --only scan --scan koala.obj",
+        .run = [options](Session& session) { run_figures(*options, session); }};
 }
 
 } // namespace filigree::cli

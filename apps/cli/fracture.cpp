@@ -45,11 +45,9 @@ void report_fracture(const FracturedMesh& fractured, double seconds, Report& rep
     report.set("largest", r.largest);
     report.set("sheet", r.is_sheet);
     if (r.is_sheet) report.row("", "the mesh has no inside: pieces are parts of its surface");
-    if (r.islands > 0)
-        report.row("",
-                   fmt::format("{} of them because a cell's matter does not hang together", with_commas(r.islands)));
+    if (r.islands > 0) report.row("", fmt::format("{} of them are separate parts of a cell", with_commas(r.islands)));
     if (r.joined > 0)
-        report.row("", fmt::format("{} parts were too small, and are one with a neighbour", with_commas(r.joined)));
+        report.row("", fmt::format("{} parts were too small and were joined to a neighbour", with_commas(r.joined)));
     report.add("cracks", fmt::format("{}, of {} faces", with_commas(r.facets), with_commas(r.inside_faces)), "facets",
                r.facets);
     report.set("inside_faces", r.inside_faces);
@@ -60,7 +58,7 @@ void report_fracture(const FracturedMesh& fractured, double seconds, Report& rep
     report.set("volume", r.volume);
     report.set("volume_error", r.volume_error);
     if (r.closing_triangles > 0 && !r.is_sheet)
-        report.row("", fmt::format("the mesh has open borders; pieces are open there as it was"));
+        report.row("", fmt::format("the mesh has open borders, and so have the pieces"));
     report.set("closing_triangles", r.closing_triangles);
     report.set("vertices", fractured.mesh.vertex_count());
     report.set("faces", fractured.mesh.face_count());
@@ -151,8 +149,9 @@ Command fracture_command() {
         .name = "fracture",
         .text = "Break a mesh into pieces",
         .options = {Option("mesh", options->input, "Mesh file").required().is_read(),
-                    output_option(options->output, "Mesh file to write, or a folder (\"pieces/\") for a file a piece"),
-                    Option("--pieces", pattern.pieces, "How many")
+                    output_option(options->output,
+                                  "Mesh file to write, or a folder (\"pieces/\") with a file for each piece"),
+                    Option("--pieces", pattern.pieces, "Number of pieces")
                         .between(1, static_cast<int>(FractureCells::kMostSeeds))
                         .with_default(),
                     choice<FracturePatternKind>(
@@ -162,35 +161,40 @@ Command fracture_command() {
                          {"slabs", FracturePatternKind::slabs},
                          {"radial", FracturePatternKind::radial},
                          {"grains", FracturePatternKind::grains}},
-                        "even (unset): pieces of about one size; impact: small ones around --at; slabs: long "
-                        "ones, as of wood; radial: rays and rings around --at, as of glass; grains: small here and "
-                        "large there, as of stone"),
-                    Option("--clump", pattern.clump, "Cells that a piece is made of; with more, pieces are knobbly")
+                        "even (default): pieces of about one size; impact: small pieces around --at; slabs: long "
+                        "pieces, like wood; radial: rays and rings around --at, like glass; grains: small pieces in "
+                        "some places, large in others, like stone"),
+                    Option("--clump", pattern.clump, "Number of cells in a piece; more cells make knobbly pieces")
                         .between(1, static_cast<int>(FracturePattern::kMostClump))
                         .with_default(),
-                    Option("--at", options->at, "A point that was hit, again for each further one (impact, radial)")
+                    Option("--at", options->at,
+                           "Impact, radial: the point that was hit (default: a corner; radial: the middle). Impact: "
+                           "may come several times")
                         .values(3, 3)
                         .comma_separated()
                         .one_at_a_time()
                         .named("X,Y,Z"),
-                    Option("--grain", options->grain, "Slabs: along which pieces are longer (unset: the longest axis)")
+                    Option("--grain", options->grain,
+                           "Slabs: direction of the long sides (default: the longest axis of the mesh)")
                         .values(3)
                         .comma_separated()
                         .named("X,Y,Z"),
-                    Option("--roughness", pattern.roughness, "Of cracks; 0: planes").between(0.0, 1.0).with_default(),
-                    Option("--edge", options->cut.edge,
-                           "Longest edges wanted on cracks, model units (unset: a twentieth of a piece, a sixth for "
-                           "planes; 0: none but "
-                           "the outlines')")
-                        .between(0.0, 1e300),
-                    Option("--smallest", options->cut.smallest,
-                           "Parts below this share of the mean volume join a neighbour")
+                    Option("--roughness", pattern.roughness, "Roughness of the cracks, 0 (planes) to 1")
                         .between(0.0, 1.0)
                         .with_default(),
-                    Option("--explode", options->explode, "Moves pieces apart, in their distances from the middle")
+                    Option("--edge", options->cut.edge,
+                           "Length of edges on crack surfaces, model units (default: a twentieth of a piece, a sixth "
+                           "if cracks are planes; 0: no vertices inside a crack surface)")
+                        .between(0.0, 1e300),
+                    Option("--smallest", options->cut.smallest,
+                           "A part smaller than this share of the mean volume is joined to a neighbour")
+                        .between(0.0, 1.0)
+                        .with_default(),
+                    Option("--explode", options->explode,
+                           "Move each piece away from the middle by this multiple of its distance")
                         .between(0.0, 1e6)
                         .with_default(),
-                    Option("--seed", options->seed, "Another number, other pieces").with_default()},
+                    Option("--seed", options->seed, "Random seed: another number gives other pieces").with_default()},
         .examples = "  filigree fracture koala.obj -o broken.glb --pieces 30\n"
                     "  filigree fracture plate.ply -o broken.ply --pattern radial --at 0,0,0 --explode 0.3\n"
                     "  filigree fracture statue.ply -o pieces/ --pattern impact --at 0.2,1.4,0 --pieces 200",

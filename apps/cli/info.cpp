@@ -166,7 +166,7 @@ Json vertices_json(const std::vector<Index>& ids) {
 /// What a coded file spends its bits on.
 void describe_coding(const ModelOutline& model, Report& report) {
     const Packing& coding = *model.coding;
-    report.add("coded",
+    report.add("packed",
                fmt::format("{} bits{}{}{}", coding.options.bits, coding.options.levels ? ", as a stream" : "",
                            coding.options.surface ? ", by surface" : "",
                            coding.options.keep_order ? ", in the input's order" : ""),
@@ -182,7 +182,7 @@ void describe_coding(const ModelOutline& model, Report& report) {
 
 void describe_code(const ModelOutline& model, Report& report) {
     if (model.lossless) {
-        report.add("coded", "lossless", "coding", {{"profile", "lossless"}});
+        report.add("packed", "lossless", "coding", {{"profile", "lossless"}});
         add_coding_shares(*model.lossless, model.levels.back().vertices, model.bytes, report);
     }
     if (model.references > 0) {
@@ -247,7 +247,7 @@ void describe_export(const Json& measured, Report& report) {
     count("keys");
     row("error at keys", "error_at_keys", " of the diagonal, as measured when it was exported");
     row("error between keys", "error_between_keys", " of the diagonal");
-    row("normals off by", "normal_error_degrees", " degrees (95th percentile) in viewers that do not correct them");
+    row("normal error", "normal_error_degrees", " degrees (95th percentile) in viewers that do not correct them");
 }
 
 /// What a glTF file has beside its mesh.
@@ -306,18 +306,17 @@ void run(const InfoArguments& options, Session& session) {
 
 Command info_command() {
     const auto options = std::make_shared<InfoArguments>();
-    return {
-        .name = "info",
-        .text = "Say what a mesh or a model is, and what is wrong with it",
-        .options = {Option("file", options->path, "Mesh or model").required(),
-                    Option("--fidelity", options->fidelity,
-                           fmt::format("Measure what a model's driver is good for, also where it takes long (more than "
-                                       "{} vertices, or {} in the driver)",
-                                       with_commas(kQuickMesh), with_commas(kQuickDriver)))},
-        .examples = "  filigree info scan.ply\n"
-                    "  filigree info scan.ply --json | jq .defects\n"
-                    "  filigree info scan.fil",
-        .run = [options](Session& session) { run(*options, session); }};
+    return {.name = "info",
+            .text = "Describe a mesh or a model, and list the defects of a mesh",
+            .options = {Option("file", options->path, "Mesh or model").required(),
+                        Option("--fidelity", options->fidelity,
+                               fmt::format("Measure the restore error of large models too (more than {} vertices, or "
+                                           "{} in the driver); small models are always measured",
+                                           with_commas(kQuickMesh), with_commas(kQuickDriver)))},
+            .examples = "  filigree info scan.ply\n"
+                        "  filigree info scan.ply --json | jq .defects\n"
+                        "  filigree info scan.fil",
+            .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

@@ -33,7 +33,7 @@ Command level_command() {
     return {.name = "level",
             .text = "Write one level of a model as a mesh; level 0 is the driver",
             .options = {Option("model", options->model, "Model file").is_read().required(),
-                        Option("level", options->level, "Level, 0 the coarsest").required(),
+                        Option("level", options->level, "Level; 0 is the coarsest").required(),
                         output_option(options->output, "Mesh file to write")},
             .examples = "  filigree level scan.fil 0 -o driver.obj",
             .run = [options](Session& session) { run(*options, session); }};

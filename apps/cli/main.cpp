@@ -24,16 +24,17 @@ int exit_code(ErrorCode code) { return static_cast<int>(code); }
 
 cli::Program make_program(cli::Session& session) {
     return {.name = "filigree",
-            .text = "Filigree takes the detail off a mesh, lets anything move what is left, and puts the detail back.",
+            .text = "Filigree takes the detail off a mesh, lets any program move the light driver that is left, and "
+                    "puts the detail back.",
             .version = FILIGREE_VERSION,
             .examples = "  filigree demo\n"
                         "  filigree strip scan.ply -o scan.fil && filigree level scan.fil 0 -o driver.obj\n"
                         "  filigree restore scan.fil --pose moved_driver.obj -o restored.ply",
-            .notes = "FILE '-' is standard input or output. Each command has examples: 'filigree COMMAND --help'.\n"
-                     "Exit codes: 0 done, 1 an error of our own, 2 usage, 3 cannot read, 4 damaged file, 5 unknown "
-                     "format, 6 cannot write,\n"
-                     "7 unsuitable input, 8 inputs do not belong together, 9 out of memory, 10 done but not to be "
-                     "trusted, 130 cancelled.",
+            .notes = "The file name '-' is standard input or output.\n"
+                     "'filigree COMMAND --help' lists a command's options, with examples.\n"
+                     "Exit codes: 0 done, 1 internal error, 2 wrong arguments, 3 cannot read, 4 damaged file,\n"
+                     "5 unknown format, 6 cannot write, 7 unsuitable input, 8 inputs do not match, 9 out of memory,\n"
+                     "10 done but not to be trusted, 130 cancelled.",
             .common = session.common_options(),
             .commands = cli::all_commands()};
 }
@@ -44,7 +45,7 @@ int print_manual(const cli::Program& program, const std::string& command) {
     if (page.empty()) {
         const std::string sentence = cli::no_such_command(program, command);
         cli::say("filigree: " + sentence + (sentence.ends_with('?') ? " " : "; ") +
-                 "'filigree --help' says what there is.");
+                 "'filigree --help' lists the commands.");
         return exit_code(ErrorCode::usage);
     }
     const bool is_written = std::fputs(page.c_str(), stdout) >= 0 && std::fflush(stdout) == 0;
@@ -69,7 +70,7 @@ int out_of_memory() {
 }
 
 int own_error(const std::exception& error) {
-    cli::say(std::string("filigree: An error of our own (") + error.what() + "); please report it with the command.");
+    cli::say(std::string("filigree: Internal error (") + error.what() + "); please report it, with the command.");
     return kOwnError;
 }
 

@@ -133,15 +133,16 @@ std::string examples(const std::string& lines) { return ".SH EXAMPLES\n.nf\n" + 
 std::string exit_status() {
     std::string text = ".SH EXIT STATUS\n";
     for (const auto& [code, meaning] : {std::pair{"0", "done"},
-                                        {"1", "an error of our own"},
-                                        {"2", "usage"},
+                                        {"1", "internal error"},
+                                        {"2", "wrong arguments"},
                                         {"3", "a file cannot be read"},
                                         {"4", "a damaged file"},
                                         {"5", "an unknown format"},
                                         {"6", "a file cannot be written"},
                                         {"7", "unsuitable input"},
-                                        {"8", "inputs that do not belong together"},
+                                        {"8", "inputs that do not match"},
                                         {"9", "out of memory"},
+                                        {"10", "done but not to be trusted"},
                                         {"130", "cancelled"}})
         text += std::string(".TP\n\\fB") + code + "\\fR\n" + meaning + "\n";
     return text;

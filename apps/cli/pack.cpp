@@ -118,7 +118,7 @@ void run(PackArguments options, Session& session) {
     report_coding(model, coding, options, now_seconds() - start, report);
     if (coding.lacks_level_attributes) session.warn(kLevelsLackAttributes);
     if (coding.out_of_reach > 0)
-        session.warn(fmt::format("{} unused {} too far from the mesh to be coded there, and {} back nearer; --profile "
+        session.warn(fmt::format("{} unused {} too far from the mesh to be packed there, and {} back nearer; --profile "
                                  "lossless keeps every place.",
                                  with_commas(coding.out_of_reach),
                                  coding.out_of_reach == 1 ? "vertex lies" : "vertices lie",
@@ -182,22 +182,23 @@ Command pack_command() {
     const auto options = std::make_shared<PackArguments>();
     return {
         .name = "pack",
-        .text = "Code a mesh or a model in few bits: a model file that every command reads",
+        .text = "Pack a mesh or a model into few bytes: a model file that every command reads",
         .options = {Option("input", options->input, "Mesh or model").is_read().required(),
                     output_option(options->output, "Model file to write (.fil)"),
                     choice<Profile>(
                         "--profile", options->profile,
                         {{"compact", Profile::compact}, {"stream", Profile::stream}, {"lossless", Profile::lossless}},
-                        "compact: the fewest bits; stream: coarse to fine, so that its first bytes show "
-                        "the whole shape; lossless: every number comes back (compact unless said)"),
-                    Option("--bits", options->code.bits, "Of positions, along the longest side of the box")
+                        "compact (default): the smallest file; stream: coarse to fine, so that the first bytes show "
+                        "the whole shape; lossless: keeps every number"),
+                    Option("--bits", options->code.bits, "Bits of a position, along the longest side of the box")
                         .between(10, 16)
                         .with_default(),
                     Option("--surface", options->code.surface,
-                           "Keep the surface rather than its vertices: they may slide along it by four times as much"),
+                           "Keep the surface, not the vertices: vertices may slide along it four times as far"),
                     Option("--keep-order", options->code.keep_order,
-                           "Vertices and faces come back in their order, which costs more than all the rest"),
-                    Option("--base", options->base, "Vertices of a mesh's driver (unset: as for strip)").whole_from(3)},
+                           "Keep the order of vertices and faces; the file is then 2 to 5 times as large"),
+                    Option("--base", options->base, "For a mesh: vertices of the driver (default: as for strip)")
+                        .whole_from(3)},
         .examples = "  filigree pack scan.ply -o scan.fil\n"
                     "  filigree pack scan.fil -o small.fil --bits 12 --surface\n"
                     "  filigree pack shot.fil -o small.fil --keep-order\n"
@@ -209,11 +210,11 @@ Command pack_command() {
 Command unpack_command() {
     const auto options = std::make_shared<UnpackArguments>();
     return {.name = "unpack",
-            .text = "Write a coded model as a plain one, which reads at once",
-            .options = {Option("model", options->input, "Coded model").is_read().required(),
+            .text = "Write a packed model as a plain model, which is read faster",
+            .options = {Option("model", options->input, "Packed model").is_read().required(),
                         output_option(options->output, "Model file to write (.fil), or a mesh with --bytes"),
                         Option("--bytes", options->bytes,
-                               "Write the mesh that so many of a stream's first bytes give; the file may end there")},
+                               "Write the mesh that the first N bytes of a stream give; the file may end there")},
             .examples = "  filigree unpack small.fil -o plain.fil\n"
                         "  filigree unpack stream.fil -o early.ply --bytes 20000",
             .run = [options](Session& session) { run_unpack(*options, session); }};

@@ -28,7 +28,7 @@ Vec3f parse_color(const std::string& text, const std::string& option) {
 
 Option found_up_option(std::optional<UpAxis>& up) {
     return choice<UpAxis>("--up", up, kUpAxes,
-                          "Which axis is up (unset: by the mesh's flat base, else z for STL and y for all others)");
+                          "Up axis (default: the axis of the mesh's flat base; without a flat base z for STL, else y)");
 }
 
 UpAxis up_of(const std::optional<UpAxis>& asked, const Mesh& mesh, const std::string& path) {

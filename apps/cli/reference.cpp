@@ -22,7 +22,7 @@ Option law_option(std::optional<HeightLaw>& law) {
     std::vector<std::pair<std::string, HeightLaw>> laws;
     for (std::string_view name : kHeightLawNames) laws.emplace_back(name, *height_law_from_name(name));
     return choice("--law", law, laws,
-                  "Of the reference code: how high detail is when its surroundings grow (unset: inverse)");
+                  "Reference code: height of the detail where the surface around it grows (default: inverse)");
 }
 
 void refuse_law(const std::string& path, const Session& session) {

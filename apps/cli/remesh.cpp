@@ -199,26 +199,24 @@ void run(RemeshArguments options, Session& session) {
 }
 
 OptionList remesh_options(QuadRemeshOptions& remesh) {
-    return {Option("--quads", remesh.quads, "About how many").whole_from(1).with_default(),
+    return {Option("--quads", remesh.quads, "Approximate number of quads").whole_from(1).with_default(),
             Option("--levels", remesh.levels,
-                   "How often each patch is halved, 1 to 8 (unset: as leaves 500 patches or more)")
+                   "Number of times that each patch is halved, 1 to 8 (default: as many as leave 500 patches or more)")
                 .between(1, 8),
             Option("--feature-angle", remesh.feature_angle_deg,
-                   "Edges whose faces meet at more than this stay edges, degrees; 180: none")
+                   "Edges whose faces meet at more than this angle stay sharp, degrees; 180: none")
                 .between(0.0, 180.0)
                 .with_default(),
             choice<SmallParts>("--small-parts", remesh.small_parts,
                                {{"remove", SmallParts::remove}, {"keep", SmallParts::keep}},
-                               "Handles and components too small for the patches: remove (unset) or keep"),
-            choice<WrapUse>(
-                "--wrap", remesh.wrap,
-                {{"auto", WrapUse::automatic}, {"never", WrapUse::never}, {"always", WrapUse::always}},
-                "A closed wrap around the mesh instead of itself: where nothing else works (unset: auto), never or "
-                "always"),
+                               "Tunnels and components too small for the patches: remove (default) or keep"),
+            choice<WrapUse>("--wrap", remesh.wrap,
+                            {{"auto", WrapUse::automatic}, {"never", WrapUse::never}, {"always", WrapUse::always}},
+                            "Remesh a closed wrap around the mesh, not the mesh itself: auto (default: only if nothing "
+                            "else works), never or always"),
             Option("--max-distance", remesh.max_distance,
-                   "What both distances may reach, fraction of the diagonal (unset: a patch's side; from the mesh to "
-                   "the quads "
-                   "6e-3 for 20,000 quads and more)")
+                   "Largest distance allowed in both directions, fraction of the diagonal (default: the side of a "
+                   "patch; from mesh to quads at most 6e-3 for 20,000 quads and more)")
                 .above_zero()};
 }
 
@@ -228,17 +226,17 @@ Command remesh_command() {
     const auto options = std::make_shared<RemeshArguments>();
     return {
         .name = "remesh",
-        .text = "Turn any mesh into quads: patches of a regular grid",
+        .text = "Turn any mesh into quads, in patches of a regular grid",
         .options =
             OptionList{Option("mesh", options->input, "Mesh").is_read().required(),
-                       output_option(options->output, "Quads to write")} +
+                       output_option(options->output, "Mesh file to write")} +
             remesh_options(options->remesh) +
             OptionList{
-                Option("--no-attributes", options->no_attributes, "Leave UVs, colours, normals and labels behind"),
-                Option("--base", options->base, "Also write the patches' corners as a mesh, a quad each").is_written(),
-                Option("--picture", options->picture, "Also draw the quads, their patches in colour (.png)")
+                Option("--no-attributes", options->no_attributes, "Do not carry over UVs, colours, normals and labels"),
+                Option("--base", options->base, "Also write a mesh with one quad for each patch").is_written(),
+                Option("--picture", options->picture, "Also draw the quads, with a colour for each patch (.png)")
                     .is_written(),
-                view_option(options->view, "Where to look from in the picture (unset: iso)"),
+                view_option(options->view, "View direction of the picture (default: iso)"),
                 found_up_option(options->up)},
         .examples = "  filigree remesh scan.ply -o quads.ply\n"
                     "  filigree remesh scan.ply -o quads.obj --quads 20000 --picture quads.png\n"

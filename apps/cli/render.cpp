@@ -86,78 +86,83 @@ void check(const RenderOptions& options, bool is_film) {
 OptionList camera_options(RenderOptions& options) {
     return {Option("--size",
                    Option::EachText([&](const std::string& text) { options.size = parse_picture_size(text); }),
-                   "Width and height in pixels, such as 1920x1080 (unset: by what is drawn)"),
-            view_option(options.view, "Where to look from (unset: iso)"),
+                   "Width and height in pixels, such as 1920x1080 (default: by the content)"),
+            view_option(options.view, "View direction (default: iso)"),
             found_up_option(options.up),
-            Option("--camera", options.camera, "Eye and target, and up if need be: 6 or 9 numbers in model units")
+            Option("--camera", options.camera,
+                   "Camera position, target and (optional) up direction: 6 or 9 numbers, model units")
                 .finite()
                 .values(6, 9)
                 .comma_separated(),
-            Option("--field-of-view", options.field_of_view, "Vertical, in degrees; 0 is parallel projection")
+            Option("--field-of-view", options.field_of_view, "Vertical field of view, degrees; 0: parallel projection")
                 .between(0.0, 150.0)
                 .with_default(),
-            Option("--shared-camera", options.shared_camera, "Several files: one camera that shows all in place")};
+            Option("--shared-camera", options.shared_camera,
+                   "Several files: one camera for all, each mesh in its own place")};
 }
 
 OptionList look_options(RenderOptions& options) {
-    return {Option("--background", options.background,
-                   "#rrggbb, two of them from top to bottom (#rrggbb,#rrggbb), or transparent"),
-            Option("--color", options.color, "Of the objects, #rrggbb (unset: their own, or clay)"),
-            choice<Shading>("--shading", options.shading,
-                            {{"auto", Shading::automatic}, {"smooth", Shading::smooth}, {"flat", Shading::flat}},
-                            "auto: the file's normals, else smooth up to 45 degrees (unset: auto)"),
-            Option("--edges", options.edges, "Draw the polygons' edges over the surface"),
-            Option("--edge-color", options.edge_color, "#rrggbb"),
-            Option("--wireframe", options.wireframe, "Draw the edges alone"),
-            choice<DrawnAs>("--as", options.as, {{"polygons", DrawnAs::polygons}, {"surfels", DrawnAs::surfels}},
-                            "polygons (default), or surfels: overlapping discs, the file's own or some made of it"),
-            Option("--points", options.points, "Draw the vertices as balls"),
-            Option("--point-radius", options.point_radius, "Of the balls, model units (unset: by their spacing)")
-                .above_zero(),
-            Option("--clip", Option::EachText([&](const std::string& text) { options.clip = parse_clip(text); }),
-                   "Cut open: z=0.5 takes away what is above the middle along z, -z=0.5 what is below")};
+    return {
+        Option("--background", options.background,
+               "Background: #rrggbb, a gradient from top to bottom (#rrggbb,#rrggbb), or transparent"),
+        Option("--color", options.color, "Colour of the objects, #rrggbb (default: their own colours, or clay)"),
+        choice<Shading>("--shading", options.shading,
+                        {{"auto", Shading::automatic}, {"smooth", Shading::smooth}, {"flat", Shading::flat}},
+                        "auto (default): the file's normals; without normals, smooth up to 45 degrees"),
+        Option("--edges", options.edges, "Draw the polygons' edges over the surface"),
+        Option("--edge-color", options.edge_color, "Colour of the edges, #rrggbb"),
+        Option("--wireframe", options.wireframe, "Draw only the edges"),
+        choice<DrawnAs>("--as", options.as, {{"polygons", DrawnAs::polygons}, {"surfels", DrawnAs::surfels}},
+                        "polygons (default), or surfels: overlapping discs, from the file or made from the surface"),
+        Option("--points", options.points, "Draw the vertices as balls"),
+        Option("--point-radius", options.point_radius, "Radius of the balls, model units (default: by their spacing)")
+            .above_zero(),
+        Option("--clip", Option::EachText([&](const std::string& text) { options.clip = parse_clip(text); }),
+               "Cut open: z=0.5 removes the upper half along z, -z=0.5 the lower half")};
 }
 
 OptionList scalar_options(RenderOptions& options) {
     return {Option("--scalar", options.scalar,
-                   "Colour by a vertex scalar of the file, or by error, strain (both with --against) or level"),
-            Option("--against", options.against, "Mesh that error and strain are measured against").is_read(),
-            Option("--range", options.range, "Least and most value of the colours (unset: by the values)")
+                   "Colour by values: a vertex scalar of the file, level, or (with --against) error or strain"),
+            Option("--against", options.against, "Mesh to compare with, for error and strain").is_read(),
+            Option("--range", options.range, "Smallest and largest value of the colours (default: from the data)")
                 .finite()
                 .values(2),
-            Option("--unit", options.unit, "Unit to write over the legend"),
+            Option("--unit", options.unit,
+                   "Unit shown in the legend. Errors are then in model units, else fractions of the diagonal"),
             choice<ColorMap>("--map", options.map,
                              {{"sequential", ColorMap::sequential}, {"diverging", ColorMap::diverging}},
-                             "Colours: for amounts, or for signed amounts (unset: sequential)")};
+                             "Colour map: sequential for amounts (default), diverging for signed amounts")};
 }
 
 OptionList page_options(RenderOptions& options) {
     return {Option("--caption", options.captions,
-                   "One a file (unset: the names, where there are several); C_m, 10^{-3}, *italic* and **bold** are "
-                   "set so")
+                   "Caption of a file; once per file (default: the file names, if there are several). C_m, 10^{-3}, "
+                   "*italic* and **bold** are formatted")
                 .one_at_a_time(), // else it would take the files behind it
             Option("--no-captions", options.no_captions, "Draw no captions"),
             Option("--no-ground", options.no_ground, "Draw no shadow on the ground")};
 }
 
 OptionList film_options(RenderOptions& options) {
-    return {Option("--poses", options.poses,
-                   "Moved drivers of a model, one a frame (PLY with gradients where there are any)")
-                .is_read(),
-            Option("--turntable", options.turntable, "A film once around the object"),
-            Option("--frames", options.frames, "Frames of a turntable").whole_from(1).with_default(),
-            Option("--chunk", options.chunk,
-                   "K/N: the K-th of N parts of the frames alone, of numbered pictures that other processes draw too"),
-            Option("--frame", options.frame,
-                   "One of the poses that the model holds, from 1 (unset: a film plays them all, a picture shows the "
-                   "model at rest)")
-                .whole_from(1),
-            Option("--fps", options.frames_per_second, "Frames a second (unset: those of the model's poses, or 30)")
-                .above_zero(),
-            Option("--passes", options.passes,
-                   "Light directions and positions within a pixel that are averaged (unset: 12 to 40 by the size of "
-                   "the mesh; films 12)")
-                .whole_from(1)};
+    return {
+        Option("--poses", options.poses, "Moved drivers of a model, one mesh per frame (PLY may have gradients)")
+            .is_read(),
+        Option("--turntable", options.turntable, "Make a film that goes once around the object"),
+        Option("--frames", options.frames, "Number of frames of a turntable").whole_from(1).with_default(),
+        Option("--chunk", options.chunk,
+               "K/N: draw only the K-th of N parts of the frames, as numbered pictures; other processes draw the other "
+               "parts"),
+        Option("--frame", options.frame,
+               "Draw pose N that the model holds, from 1 (default: a film plays all poses, a picture shows the model "
+               "at rest)")
+            .whole_from(1),
+        Option("--fps", options.frames_per_second, "Frames per second (default: the rate of the model's poses, or 30)")
+            .above_zero(),
+        Option("--passes", options.passes,
+               "Number of passes that are averaged; more passes give softer light and smoother edges (default: 12 to "
+               "40 by the size of the mesh; films 12)")
+            .whole_from(1)};
 }
 
 void run(const RenderOptions& options, Session& session) {
@@ -173,8 +178,8 @@ Command render_command() {
     return {.name = "render",
             .text = "Draw meshes, point sets and models: a picture or a film",
             .options = OptionList{Option("files", options->files,
-                                         "Meshes, point sets or models, before the options; several stand side by "
-                                         "side, or one after the other in a film")
+                                         "Meshes, point sets or models; give them before the options. A picture shows "
+                                         "several side by side, a film one after the other")
                                       .is_read()
                                       .required(),
                                   output_option(options->output,

@@ -21,7 +21,7 @@
 namespace filigree::cli {
 
 OptionList restore_options(RestoreOptions& options) {
-    return {Option("--level", options.level, "Restore up to this level (unset: the finest)")};
+    return {Option("--level", options.level, "Restore up to this level (default: the finest)")};
 }
 
 namespace {
@@ -332,11 +332,11 @@ Command restore_command() {
                 OptionList{
                     Option("model", options->model, "Model file").is_read().required(),
                     Option("--pose", options->pose,
-                           "The moved driver: level 0 with the same vertex order; a PLY with vertex properties f00 .. "
-                           "f22 gives gradients too")
+                           "The moved driver: level 0 with the same vertex order. A PLY may have gradients (vertex "
+                           "properties f00 to f22)")
                         .is_read(),
-                    Option("--frame", options->frame, "Or one of the poses that the model holds, from 1").whole_from(1),
-                    Option("--frames", options->all_frames, "Or all of them, as an animation"),
+                    Option("--frame", options->frame, "Or pose N that the model holds, from 1").whole_from(1),
+                    Option("--frames", options->all_frames, "Or all poses that the model holds, as an animation"),
                     Option("--poses", options->poses,
                            "Or an animation of the driver: .pc2, .mdd, a folder of numbered meshes or NAME_####.ply, "
                            "an animated .glb, another .fil's poses")} +
@@ -345,14 +345,14 @@ Command restore_command() {
                                          "Mesh to write; an animation: .pc2, .mdd, .glb, .usda, a folder for "
                                          "NAME_0001.ply and so on, or NAME_####.obj"),
                            Option("--chunk", options->chunk,
-                                  "K/N: the K-th of N parts of the frames alone, into a .pc2 that other processes "
-                                  "write too, on any machine"),
+                                  "K/N: restore only the K-th of N parts of the frames, into a .pc2 in which other "
+                                  "processes, on any machine, write the other parts"),
                            Option("--surfels", options->as_surfels,
-                                  "Write surfels: points with a normal and two half axes, carried from rest (.ply)"),
+                                  "Write surfels (.ply): points with a normal and the two half axes of a disc"),
                            Option("--input-order", options->in_input_order,
                                   "Write the vertices in the order they had before 'strip --reorder'"),
                            Option("--picture", options->picture,
-                                  "Also draw the mesh coloured by the error to expect (.png, .svg, .pdf)")
+                                  "Also draw the mesh, coloured by the expected error (.png, .svg, .pdf)")
                                .is_written(),
                            found_up_option(options->up)} +
                 restore_options(options->restore) + OptionList{law_option(options->law)} +

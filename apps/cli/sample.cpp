@@ -173,34 +173,35 @@ void run(SampleArguments options, Session& session) {
 }
 
 OptionList point_options(SampleArguments& options) {
-    return {
-        Option("--spacing", options.spacing, "Between lattice points, model units").above_zero(),
-        Option("--count", options.count, "Choose the spacing so that about as many are inside")
-            .whole_from(1)
-            .excludes({"--spacing"}),
-        Option("--frustum", options.frustum, "Instead: the report's points in view, so many across, up and in depth")
-            .values(3)
-            .whole_from(1)
-            .excludes({"--spacing", "--count"})};
+    return {Option("--spacing", options.spacing, "Distance between lattice points, model units").above_zero(),
+            Option("--count", options.count, "Choose the spacing so that about this many points are inside")
+                .whole_from(1)
+                .excludes({"--spacing"}),
+            Option("--frustum", options.frustum,
+                   "Instead of a lattice: points in the view of a camera; their numbers across, up and in depth")
+                .values(3)
+                .whole_from(1)
+                .excludes({"--spacing", "--count"})};
 }
 
 OptionList inside_options(SampleArguments& options) {
     return {choice<InsideMethod>("--method", options.inside.method, kMethods,
-                                 "How to tell (unset: scan where the mesh is closed, else winding)"),
+                                 "How inside is decided (default: scan if the mesh is closed, else winding)"),
             choice<Pattern>("--pattern", options.pattern,
                             {{"lattice", Pattern::lattice}, {"jitter", Pattern::jitter}, {"poisson", Pattern::poisson}},
-                            "How the points are spread (unset: lattice)"),
+                            "How the points are placed (default: lattice)"),
             choice<Overlap>("--overlap", options.inside.overlap,
                             {{"parity", Overlap::parity}, {"merged", Overlap::merged}},
-                            "Closed parts that overlap are hollow there, or merged (unset: parity)"),
+                            "Where closed parts overlap: parity (hollow, default) or merged (solid)"),
             Option("--accuracy", options.inside.accuracy, "winding: largest error of a winding number")
                 .between(1e-4, 0.1)
                 .with_default(),
-            Option("--origin", options.origin, "A lattice point (unset: half a spacing inside the box)")
+            Option("--origin", options.origin, "Position of a lattice point (default: half a spacing inside the box)")
                 .values(3)
                 .comma_separated()
                 .finite(),
-            Option("--eye", options.eye, "rays and --frustum: where they start (unset: outside, in no special place)")
+            Option("--eye", options.eye,
+                   "rays and --frustum: the point where rays start (default: a point outside the mesh)")
                 .values(3)
                 .comma_separated()
                 .finite(),
@@ -212,9 +213,9 @@ OptionList inside_options(SampleArguments& options) {
 Command sample_command() {
     const auto options = std::make_shared<SampleArguments>();
     return {.name = "sample",
-            .text = "Fill a mesh with points: those of a regular lattice that are inside",
+            .text = "Fill a mesh with the points of a regular lattice that are inside",
             .options = OptionList{Option("mesh", options->input, "Mesh").is_read().required(),
-                                  output_option(options->output, "Points, as a mesh file without faces")} +
+                                  output_option(options->output, "File to write: a mesh of points, without faces")} +
                        point_options(*options) + inside_options(*options) +
                        OptionList{Option("--picture", options->picture,
                                          "Also draw the points, and the surface cut open (.png)")

@@ -92,8 +92,8 @@ private:
 
 OptionList Session::common_options() {
     return {Option("--json", json, "Print the result as JSON"),
-            Option("--threads", threads, "Threads to use; 0 for all (results never depend on it)").between(0, 1024),
-            Option("--quiet", quiet, "No progress bar, no warnings, no summary of what was written")};
+            Option("--threads", threads, "Number of threads; 0: all. Results do not depend on it").between(0, 1024),
+            Option("--quiet", quiet, "No progress bar, no warnings, no summary of written files")};
 }
 
 std::string Session::first_given(const std::vector<std::string>& options) const {

@@ -161,6 +161,7 @@ public:
         session.warn(ready_.warnings);
         run_.emplace(require(SceneRun::create(scene_, ready_, options.check, session.context())));
         if (!options.resume.empty()) require(run_->resume(require(read_file(options.resume)), options.resume));
+        session.warn(run_->warnings()); // what is known before the work, such as a body that starts inside an obstacle
     }
 
     void simulate() {
@@ -403,35 +404,35 @@ void run(const SimulateArguments& options, Session& session) {
 
 Command simulate_command() {
     const auto options = std::make_shared<SimulateArguments>();
-    return {.name = "simulate",
-            .text = "Let the bodies of a scene move: a film, a model with poses, or meshes",
-            .options =
-                OptionList{
-                    Option("scene", options->scene, "Scene (.toml), see docs/scenes.md"),
-                    Option("-o,--output", options->outputs,
-                           "A model with its poses (.fil), a film (.mp4, .gif, NAME_%04d.png), the detailed mesh "
-                           "moving (.glb, .pc2, .mdd, .usda), or a folder of meshes (NAME/); may come several times")
-                        .one_at_a_time(),
-                    Option("--surfels", options->as_surfels,
-                           "Folders hold surfels of bodies of mpm: points with a normal and two half axes"),
-                    Option("--frames", options->frames, "Frames to compute (unset: as the scene says)").whole_from(1),
-                    Option("--check", options->check,
-                           "Also carry every vertex by the particles, and say how far the restored mesh is from that"),
-                    Option("--finer", options->finer,
-                           "Also simulate eight times the particles, and say how far our meshes are from theirs"),
-                    Option("--stop-at", options->stop_at, "Stop after this frame, to go on later; with --save")
-                        .whole_from(1),
-                    Option("--save", options->save, "Write the state at the end, or when cancelled, to go on from"),
-                    Option("--resume", options->resume, "Go on from a state that --save wrote")} +
-                animation_options(options->animation) +
-                OptionList{Option("--keys", options->keys, "Print every key that a scene can have, and the materials")},
-            .examples = "  filigree simulate bounce.toml -o bounce.mp4 -o bounce.fil\n"
-                        "  filigree simulate bounce.toml -o bounce.glb -o bounce.pc2\n"
-                        "  filigree simulate bounce.toml -o meshes/ --frames 60 --check\n"
-                        "  filigree simulate long.toml --save state --stop-at 100\n"
-                        "  filigree simulate long.toml --resume state -o long.mp4\n"
-                        "  filigree simulate --keys",
-            .run = [options](Session& session) { run(*options, session); }};
+    return {
+        .name = "simulate",
+        .text = "Simulate a scene: write a film, a model with poses, or meshes",
+        .options =
+            OptionList{
+                Option("scene", options->scene, "Scene (.toml), see docs/scenes.md"),
+                Option("-o,--output", options->outputs,
+                       "Output: a model with its poses (.fil), a film (.mp4, .gif, NAME_%04d.png), the detailed mesh "
+                       "in motion (.glb, .pc2, .mdd, .usda), or a folder of meshes (NAME/). May come several times")
+                    .one_at_a_time(),
+                Option("--surfels", options->as_surfels,
+                       "Write surfels of mpm bodies into folders, not meshes: points with a normal and two half axes"),
+                Option("--frames", options->frames, "Number of frames (default: that of the scene)").whole_from(1),
+                Option("--check", options->check,
+                       "Also move every vertex by the particles, and report how far the restored mesh is from that"),
+                Option("--finer", options->finer,
+                       "Also simulate with eight times the particles, and report how far the meshes are from those"),
+                Option("--stop-at", options->stop_at, "Stop after this frame; --save keeps the state").whole_from(1),
+                Option("--save", options->save, "Write the state at the end, or when cancelled, for --resume"),
+                Option("--resume", options->resume, "Continue from a state that --save wrote")} +
+            animation_options(options->animation) +
+            OptionList{Option("--keys", options->keys, "Print every key that a scene can have, and the materials")},
+        .examples = "  filigree simulate bounce.toml -o bounce.mp4 -o bounce.fil\n"
+                    "  filigree simulate bounce.toml -o bounce.glb -o bounce.pc2\n"
+                    "  filigree simulate bounce.toml -o meshes/ --frames 60 --check\n"
+                    "  filigree simulate long.toml --save state --stop-at 100\n"
+                    "  filigree simulate long.toml --resume state -o long.mp4\n"
+                    "  filigree simulate --keys",
+        .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

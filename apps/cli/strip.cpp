@@ -41,8 +41,8 @@ void report_doubts(const StripReport& strip, Report& report) {
         report.set(key, count);
     };
     add("vertices at one place", "welded_vertices", strip.welded_vertices, "");
-    add("forced collapses", "forced_collapses", strip.forced_collapses, " (scraps and handles dropped)");
-    add("bound across gaps", "across_gap", strip.across_gap, " (parts without a driver of their own)");
+    add("forced collapses", "forced_collapses", strip.forced_collapses, " (small components and tunnels removed)");
+    add("bound across gaps", "across_gap", strip.across_gap, " (vertices of parts that have no driver vertex)");
     add("bound facing away", "facing_away", strip.facing_away, "");
 }
 
@@ -141,50 +141,51 @@ Command strip_command() {
     StripOptions& strip = options->strip;
     return {
         .name = "strip",
-        .text = "Take the detail off a mesh: make a model with a light driver",
+        .text = "Take the detail off a mesh: write a model with a light driver",
         .options =
             {Option("mesh", options->input, "Mesh to strip").is_read().required(),
              output_option(options->output, "Model file to write (.fil)"),
-             Option("--base", strip.base, "Vertices of the driver (unset: 1,000, fewer for small meshes)")
+             Option("--base", strip.base, "Vertices of the driver (default: 1,000, fewer for small meshes)")
                  .whole_from(3)
                  .excludes({"--levels", "--error", "--fidelity"}),
-             Option("--driver", options->driver,
-                    "Mesh to bind to, made elsewhere: its vertices are the driver's; restored meshes have them "
-                    "behind their own")
+             Option("--driver", options->driver, "Use this mesh as the driver: poses have its vertices, in their order")
                  .is_read()
                  .excludes({"--base", "--levels", "--error", "--fidelity", "--fidelity-from", "--max-edge", "--code",
                             "--references"}),
-             Option("--levels", strip.levels, "Levels to remove, each leaves a quarter of the vertices")
+             Option("--levels", strip.levels,
+                    "Number of levels below the finest; each has a quarter of the vertices of the next finer level")
                  .whole_from(1)
                  .excludes({"--error", "--fidelity"}),
-             Option("--error", strip.error, "How far the driver may leave the mesh (rms), fraction of the diagonal")
+             Option("--error", strip.error,
+                    "Coarsest driver within this distance of the mesh (rms), fraction of the diagonal")
                  .above_zero()
                  .excludes({"--fidelity"}),
              Option("--fidelity", options->fidelity,
-                    "Smallest driver that restores bends, twists, tapers and random warps to this rms error, "
-                    "fraction of the diagonal")
+                    "Smallest driver that restores bends, twists, tapers and random deformations with this rms error "
+                    "or less, fraction of the diagonal")
                  .above_zero(),
              choice<PoseSource>("--fidelity-from", options->fidelity_from,
                                 {{"positions", PoseSource::positions}, {"gradients", PoseSource::gradients}},
-                                "What poses will come with: positions (default) or gradients too"),
-             Option("--max-edge", strip.max_edge,
-                    "Longest edge that simplifying may leave, fraction of the diagonal: flat parts keep "
-                    "vertices")
+                                "For --fidelity: poses have only positions (default), or gradients too"),
+             Option(
+                 "--max-edge", strip.max_edge,
+                 "Longest edge that simplification makes, fraction of the diagonal; flat parts then keep more vertices")
                  .above_zero(),
              choice<bool>("--code", options->with_reference_code, {{"blend", false}, {"reference", true}},
-                          "blend: any mesh (default); reference: the report's, for regular quads"),
+                          "blend: for any mesh (default); reference: the report's method, for regular quads"),
              choice<Precision>("--precision", strip.precision,
                                {{"float", Precision::float32}, {"int16", Precision::int16}},
-                               "Of the blend code: float, 20 bytes a vertex (default), or int16, 10 bytes"),
+                               "Blend code: float (20 bytes per vertex, default) or int16 (10 bytes)"),
              Option("--reorder", strip.reorder,
-                    "Renumber vertices by where they are: a mesh whose order is hopeless restores faster; "
-                    "'restore --input-order' gives meshes in the old order")
+                    "Renumber vertices so that neighbours lie together: a mesh in random order restores faster. "
+                    "'restore --input-order' writes the old order")
                  .excludes({"--driver"}),
              Option("--memory", options->memory,
-                    "How much its arrays may take, such as 8G; the others lie in a file beside the output while it "
-                    "runs (unset: three quarters of what is free)")
+                    "Memory for arrays, such as 8G; further arrays go to a temporary file beside the output (default: "
+                    "three quarters of the free memory)")
                  .named("SIZE"),
-             Option("--references", options->references, "Of the reference code: coarse points that a point refers to")
+             Option("--references", options->references,
+                    "Reference code: number of coarse points that a point refers to")
                  .one_of({"3", "4", "6"})
                  .with_default()},
         .examples = "  filigree strip scan.ply -o scan.fil\n"

@@ -295,27 +295,31 @@ void run(const SweepArguments& options, Session& session) {
 
 Command sweep_command() {
     const auto options = std::make_shared<SweepArguments>();
-    return {.name = "sweep",
-            .text = "Simulate scenes with many values of their keys: a table of figures, a row a body",
-            .options =
-                OptionList{
-                    Option("scenes", options->scenes, "Scenes (.toml), see docs/scenes.md; before the options")
-                        .is_read()
-                        .required(),
-                    output_option(options->output, "The table (.csv)"),
-                    Option("--set", options->sets,
-                           "TABLE.KEY=VALUE,VALUE: a run with each; may come several times, then with all "
-                           "combinations. TABLE[N].KEY: of the N-th alone")
-                        .one_at_a_time(),
-                    Option("--frames", options->frames, "Frames of each run (unset: as the scene says)").whole_from(1),
-                    Option("--check", options->check,
-                           "Also how far the restored meshes are from every vertex carried by the particles"),
-                    Option("--finer", options->finer, "Also how far they are from those of eight times the particles"),
-                    Option("--chunk", options->chunk,
-                           "K/N: the K-th of N parts of the runs alone, while other processes do the others")},
-            .examples = "  filigree sweep bounce.toml -o table.csv --set body.young_modulus=1e4,1e5,1e6 --check\n"
-                        "  filigree sweep a.toml b.toml -o table.csv --set simulation.mode=auto,explicit --chunk 3/40",
-            .run = [options](Session& session) { run(*options, session); }};
+    return {
+        .name = "sweep",
+        .text = "Simulate scenes with many values of their keys: a table with a row for each run and body",
+        .options =
+            OptionList{
+                Option("scenes", options->scenes, "Scenes (.toml, see docs/scenes.md); give them before the options")
+                    .is_read()
+                    .required(),
+                output_option(options->output, "The table (.csv)"),
+                Option("--set", options->sets,
+                       "TABLE.KEY=VALUE,VALUE: a run with each value. May come several times, for all combinations. "
+                       "TABLE[N].KEY: only the N-th table")
+                    .one_at_a_time(),
+                Option("--frames", options->frames, "Number of frames of each run (default: that of the scene)")
+                    .whole_from(1),
+                Option("--check", options->check,
+                       "More columns: how far the restored meshes are from meshes with every vertex moved by the "
+                       "particles"),
+                Option("--finer", options->finer,
+                       "More columns: how far the meshes are from those of eight times the particles"),
+                Option("--chunk", options->chunk,
+                       "K/N: make only the K-th of N parts of the runs; other processes make the other parts")},
+        .examples = "  filigree sweep bounce.toml -o table.csv --set body.young_modulus=1e4,1e5,1e6 --check\n"
+                    "  filigree sweep a.toml b.toml -o table.csv --set simulation.mode=auto,explicit --chunk 3/40",
+        .run = [options](Session& session) { run(*options, session); }};
 }
 
 } // namespace filigree::cli

@@ -79,7 +79,7 @@ std::string no_such_command(const Program& program, const std::string& word) {
     std::vector<std::string> names;
     for (const Command& command : program.commands) names.push_back(command.name);
     const std::string alike = like(word, names);
-    return fmt::format("'{}' is no command{}", word, alike.empty() ? "" : "; did you mean '" + alike + "'?");
+    return fmt::format("there is no command '{}'{}", word, alike.empty() ? "" : "; did you mean '" + alike + "'?");
 }
 
 std::string wrong_command(const Program& program, std::span<const std::string> words) {
@@ -99,7 +99,7 @@ std::string given_again(const OptionList& options, std::span<const std::string> 
         const Option* option = find_option(options, option_part(word));
         if (!option || !counts_once(*option)) continue;
         if (std::find(met.begin(), met.end(), option) != met.end())
-            return option->long_name() + " is given twice, and counts once";
+            return option->long_name() + " is given twice; give it once";
         met.push_back(option);
     }
     return "";
@@ -135,7 +135,7 @@ std::string wrong_type(const OptionList& options, const std::string& name, const
 
 std::string wrong_word(const std::string& word, const std::vector<std::string>& words) {
     const std::string alike = like(word, words);
-    return fmt::format("'{}' is none of {}{}", word, fmt::join(words, ", "),
+    return fmt::format("'{}' is not one of {}{}", word, fmt::join(words, ", "),
                        alike.empty() ? "" : "; did you mean '" + alike + "'?");
 }
 

@@ -1,3 +1,4 @@
+// What a benchmark measured: figures with names and units, and tables.
 #pragma once
 
 #include <string>

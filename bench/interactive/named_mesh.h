@@ -1,3 +1,4 @@
+// The meshes that benchmarks measure with, and the sizes of their drivers.
 #pragma once
 
 #include "filigree/mesh.h"

@@ -205,7 +205,7 @@ TEST_F(Animation, NormalsFarOffAreSaid) {
     EXPECT_GT(report["normal_error_degrees"].get<double>(), 10);
     EXPECT_EQ(report["warnings"].dump(), "[]");
     const Ran ran = ok(stretched);
-    EXPECT_NE(ran.out.find("degrees off"), std::string::npos) << ran.out;
+    EXPECT_NE(ran.out.find("95 % are off by less than"), std::string::npos) << ran.out;
     EXPECT_NE(ran.out.find("Shading: Smooth"), std::string::npos) << ran.out;
     EXPECT_EQ(ran.err, "");
     std::vector<std::string> without = stretched;

@@ -12,9 +12,9 @@ using namespace filigree_test;
 
 namespace {
 
-const std::vector<std::string> kCommands = {"make",    "info",    "strip",    "level", "deform",
-                                            "restore", "compare", "bench",    "demo",  "render",
-                                            "figures", "sample",  "simulate", "sweep", "remesh"};
+const std::vector<std::string> kCommands = {"make",   "info",   "strip",    "level",   "deform", "restore",  "compare",
+                                            "bench",  "demo",   "render",   "figures", "sample", "simulate", "sweep",
+                                            "remesh", "export", "fracture", "pack",    "unpack"};
 
 std::vector<std::string> lines_of(const std::string& text) {
     std::vector<std::string> lines;

@@ -6,11 +6,19 @@ A section, or a row of the fuzzing table, of which COUNTS has nothing stays as i
 import json
 import re
 import sys
+import textwrap
 from collections import defaultdict
 from pathlib import Path
 
+NAMED_FILES = 8  # of those with little coverage
+
 counts, page, root = (Path(word) for word in sys.argv[1:4])
 old = page.read_text() if page.exists() else ""
+
+
+def prose(*sentences):
+    """Lines of the page, of 100 columns at most."""
+    return textwrap.wrap(" ".join(sentences), 100, break_long_words=False, break_on_hyphens=False)
 
 
 def old_section(title):
@@ -47,9 +55,9 @@ def fuzzing():
         kept = len(list((root / "tests/fuzz/crashes" / name).glob("*")))
         kept_text = f"; {kept} kept as tests" if kept else ""
         rows[name] = (runs, f"| `{name}` | {runs:,} | {minutes} | {said}{kept_text} | {when} |")
-    return ["libFuzzer with the address and undefined-behaviour sanitizers (`scripts/fuzz`). What broke a target lies in "
-            "`tests/fuzz/crashes` and is replayed by `scripts/test`.", "",
-            "| target | inputs | minutes | in the last run | last run |", "|---|---|---|---|---|",
+    return [*prose("`scripts/fuzz` runs libFuzzer with the address and undefined-behaviour sanitizers. Inputs that broke a",
+                   "target are kept in `tests/fuzz/crashes`, and `scripts/test` replays them."), "",
+            "| target | inputs | minutes | result | last run |", "|---|---|---|---|---|",
             *[line for _, (_, line) in sorted(rows.items())],
             f"| all | {sum(runs for runs, _ in rows.values()):,} | | | |"]
 
@@ -65,17 +73,20 @@ def checks():
     for line in (counts / "check").read_text().splitlines():
         word, ended, minutes, processors, day, commit = line.split()
         rows[word] = f"| `{word}` | {ended} | {minutes} | {processors} | {day}, {commit} |"
-    return ["`scripts/check` over everything, or over the layers behind the colon; with building what was not built.", "",
-            "| step | | minutes | processors | last run |", "|---|---|---|---|---|", *[line for _, line in sorted(rows.items())]]
+    return [*prose("`scripts/check` runs these steps; its first lines explain them. Names after a colon are layers: the step",
+                   "ran over these alone. Minutes include building."), "",
+            "| step | result | minutes | processors | last run |", "|---|---|---|---|---|",
+            *[line for _, line in sorted(rows.items())]]
 
 
 def properties():
     if not (counts / "properties").exists():
         return None
     tries, when = (counts / "properties").read_text().strip().split(maxsplit=1)
-    return ["What has to come out the same two ways on random meshes (`tests/properties`: threads, order, turned, file and "
-            "memory, coded and plain, scan, rays and winding, pieces and whole, bodies): "
-            f"{int(tries):,} tries of each with `scripts/properties`, none failed. Last run: {when}."]
+    return prose("`scripts/properties` computes results in two ways, on random meshes, and compares them: with one thread and",
+                 "with several; a mesh and the mesh turned; from a file and from memory; packed and plain; points inside by",
+                 "scan, by rays and by winding numbers; and more (`tests/properties`).",
+                 f"{int(tries):,} tries of each, none failed. Last run: {when}.")
 
 
 def torture():
@@ -87,14 +98,14 @@ def torture():
     def all_of(count):
         return f"{sum(output[count] for output in told.values()):,}"
 
-    return ["Outputs under kills (before every call that changes a file, where memory is asked for, and by the clock), failing "
-            "calls (write, fsync, rename, open, malloc), full disks, file-size and memory limits, and two writers at once "
-            "(`scripts/torture`). Afterwards the old file has to be there whole or the new one byte for byte, and after the next "
-            "run nothing beside it.", "", "| | |", "|---|---|",
+    return [*prose("`scripts/torture` disturbs a program while it writes: kills, failing calls (write, fsync, rename, open,",
+                   "malloc), full disks, limits of file size and memory, and two writers at once. Afterwards the old file must",
+                   "be whole, or the new file there byte for byte. After the next run no other file may be left."),
+            "", "| | |", "|---|---|",
             f"| outputs | {', '.join(f'`{name}`' for name in told)} |",
-            f"| kills that struck before the end | {all_of('kills_struck')} of {all_of('kills')} |",
-            f"| failing calls that struck | {all_of('failures_struck')} of {all_of('failures')} |",
-            f"| limits, full disks, rival writers | {all_of('limits')} |", f"| wrong | {len(sentences)} |",
+            f"| kills before the program's end | {all_of('kills_struck')} of {all_of('kills')} |",
+            f"| failing calls that were reached | {all_of('failures_struck')} of {all_of('failures')} |",
+            f"| limits, full disks, two writers | {all_of('limits')} |", f"| wrong results | {len(sentences)} |",
             f"| last run | {when_of('torture')} |",
             *[""] * bool(sentences), *[f"- {sentence}" for sentence in sentences]]
 
@@ -104,9 +115,10 @@ def bounds():
     if not told:
         return None
     marked = lambda growth: f"**{growth:.2f}**" if growth > 2.5 else f"{growth:.2f}"
-    return [f"Every command over {told['rungs']} meshes from {told['first']:,} vertices on, each twice the one before "
-            "(`scripts/bounds`): processor seconds (of a machine as fast as in the middle of the run) and memory of the largest, and the most that either grew at a step. 2.5 is "
-            "the limit, and what is beyond it is in bold; steps below 0.3 s and 60 MiB are not judged (0).", "",
+    return [*prose(f"`scripts/bounds` runs every command on {told['rungs']} meshes. The first has {told['first']:,} vertices,",
+                   "each further one twice as many. Processor seconds and MiB are those of the largest mesh. Growth is the",
+                   "largest factor between two sizes: 2 is linear, and above 2.5 (bold) the run fails. 0: too small to be",
+                   "judged (below 0.3 s, 60 MiB)."), "",
             "| command | seconds | growth | MiB | growth |", "|---|---|---|---|---|",
             *[f"| {name} | {row['seconds'][-1]:.2f} | {marked(row['seconds_growth'])} | {row['mib'][-1]:.0f} | "
               f"{marked(row['mib_growth'])} |" for name, row in told["commands"].items()],
@@ -120,13 +132,12 @@ def mutants():
     verdicts = judgements()
     same = sum(verdicts.get(f"{m['where'].rsplit(':', 1)[0]}: {m['became']}", "").startswith("changes nothing")
                for m in told["escaped"])
-    escaped = ["", "What escaped:", "", *[f"- `{m['where']}`: `{m['became']}`" for m in told["escaped"]]]
-    runs = ", ".join(f"{made} of seed {seed}" for seed, made in told["seeds"].items())
-    return [f"Small changes of hierarchy, sample, coding and fracture, one at a time (`scripts/mutate`; {runs}): "
-            f"{told['caught']} of {told['made']} made a test fail, {same} of the others change nothing, as judged below: "
-            f"{100 * told['caught'] / max(1, told['made'] - same):.0f} % of those that change something were caught. "
-            f"Last run: {when_of('mutants')}.",
-            *(escaped if told["escaped"] else [])]
+    return [*prose("`scripts/mutate` makes one small change of the library at a time and runs the tests. "
+                   f"{told['caught']} of {told['made']} made a test fail, {same} change no result:",
+                   f"{100 * told['caught'] / max(1, told['made'] - same):.0f} % of the changes that matter were caught.",
+                   "`tests/torture/judged_mutants.json` has a judgement of each that escaped.",
+                   f"Last run: {when_of('mutants')}."),
+            *[f"- not judged: `{m['where']}`: `{m['became']}`" for m in told["escaped"]]]
 
 
 def judgements():
@@ -136,13 +147,13 @@ def judgements():
 
 
 def judged(section):
-    """The same, behind each."""
+    """The same without the mutants that are judged."""
     verdicts = judgements()
     lines = []
     for line in section or []:
-        mutant = re.match(r"- `(.*?):\d+`: `(.*?)`", line)
-        verdict = mutant and verdicts.get(f"{mutant[1]}: {mutant[2]}")
-        lines.append(f"{mutant[0]}: {verdict}" if verdict else line)
+        mutant = re.match(r"- not judged: `(.*?):\d+`: `(.*)`$", line)
+        if not mutant or f"{mutant[1]}: {mutant[2]}" not in verdicts:
+            lines += [""] * (mutant is not None and not lines[-1].startswith("- ")) + [line]
     return lines or None
 
 
@@ -152,23 +163,26 @@ def coverage():
         return None
     share = lambda part: f"{100 * part['covered'] / part['lines']:.1f} %"
     whole = {key: sum(layer[key] for layer in told["layers"].values()) for key in ("covered", "lines")}
-    missed = told["without"] and f" Not counted, as its tests did not run: {', '.join(told['without'])}."
-    in_part = told["in_part"] and f" Ran in part: {', '.join(told['in_part'])}."
-    return ["Lines of the library that the tests of its layers and the fuzz targets' replay run, by gcov (`scripts/coverage`). "
-            "Tests of the programs, the studio and Python run more of them, and are not counted."
-            + (missed or "") + (in_part or ""), "",
+    missed = f"Not counted, as its tests did not run: {', '.join(told['without'])}."
+    in_part = f"Ran in part: {', '.join(told['in_part'])}."
+    lowest = ", ".join(f"`{file['file']}` {share(file)}" for file in told["below"][:NAMED_FILES])
+    return [*prose("`scripts/coverage` counts, by gcov, the lines of the library that run in the tests of its layers and in the",
+                   "replay of fuzzed inputs. Tests of the programs, the studio and Python are not counted. Names are those of",
+                   "the run's commit."),
+            *[missed] * bool(told["without"]), *[in_part] * bool(told["in_part"]), "",
             "| layer | lines | run |", "|---|---|---|",
             *[f"| `{name}` | {layer['lines']:,} | {share(layer)} |" for name, layer in sorted(told["layers"].items())],
             f"| all | {whole['lines']:,} | {share(whole)} |", "",
-            f"Files below {told['least']} %: " + (", ".join(f"`{file['file']}` {share(file)}" for file in told["below"]) or "none")
-            + f". Last run: {when_of('coverage')}."]
+            *prose(f"Files below {told['least']} %: {len(told['below']) or 'none'}.",
+                   *[f"The lowest: {lowest}."] * bool(told["below"]), f"Last run: {when_of('coverage')}.")]
 
 
 def long_life():
     if not when_of("long_life"):
         return None
-    lines = ["One process (`scripts/long-life`), memory in MiB after a tenth of the way and at the end. What comes again has to "
-             "have the bytes that it had.", "", "| | | compared with before | memory | at the end |", "|---|---|---|---|---|"]
+    lines = [*prose("`scripts/long-life` repeats work in one process. Repeated results must have the same bytes, and memory must",
+                    "not grow. MiB: after a tenth of the run, and at its end."), "",
+             "| work | amount | repeated results | MiB | at the end |", "|---|---|---|---|---|"]
     what = {"rounds": "strip, pose, restore", "frames": "simulation"}
     for line in (counts / "long_life").read_text().splitlines():
         name, count, _, compared, _, warm, _, end = line.split()
@@ -179,8 +193,9 @@ def long_life():
 def studio():
     if not (counts / "studio").exists():
         return None
-    lines = ["Random actions in one window after another; files damaged while they are open, full disks, saves that cannot be, "
-             "windows closed while they work (`scripts/soak-studio`).", "", "| build | | run |", "|---|---|---|"]
+    lines = [*prose("`scripts/soak-studio` does random actions in one window after another. It damages files while they are",
+                    "open, fills the disk, makes saves fail, and closes windows that work. Whole: nothing failed."), "",
+             "| build | result | run |", "|---|---|---|"]
     rows = [line for line in old_section("The studio") or [] if re.match(r"\| \w+ \| .* \| \d", line)]
     for line in (counts / "studio").read_text().splitlines():
         preset, said, when = line.split("|")
@@ -191,11 +206,11 @@ def studio():
 
 def uncovered(sections):
     studio_rows = "\n".join(sections.get("The studio") or [])
-    tries = re.search(r"of (\d+) made a test fail", "\n".join(sections.get("Tests of the tests") or []))
-    return [*["- The studio's hours of random actions were not under sanitizers."] * ("| asan |" not in studio_rows),
+    tries = re.search(r"of (\d+)\s+made\s+a\s+test\s+fail", "\n".join(sections.get("Tests of the tests") or []))
+    return [*["- The studio's random actions did not run under sanitizers."] * ("| asan |" not in studio_rows),
             *["- No line coverage."] * (not sections.get("Line coverage")),
-            *["- Two hundred mutants were aimed at; see how many were tried."] * (not tries or int(tries[1]) < 200),
-            "- No soak of a day."]
+            *["- Fewer than 200 mutants were tried."] * (not tries or int(tries[1]) < 200),
+            "- No run of the studio lasted a day."]
 
 
 MAKERS = {"Checks of the tree": checks, "Fuzzing": fuzzing, "Properties": properties, "Line coverage": coverage,
@@ -203,10 +218,14 @@ MAKERS = {"Checks of the tree": checks, "Fuzzing": fuzzing, "Properties": proper
           "Tests of the tests": mutants}
 sections = {title: make() or old_section(title) for title, make in MAKERS.items()}
 sections["Tests of the tests"] = judged(sections["Tests of the tests"])
-sections["What nothing covers"] = uncovered(sections)
+sections["Limits"] = uncovered(sections)
 lines = ["# Reliability", "",
-         "Written by `scripts/reliability` from what `scripts/check`, `fuzz`, `properties`, `coverage`, `torture`, `bounds`, "
-         "`long-life`, `soak-studio` and `mutate` counted last; not by hand.", ""]
+         *prose("Which checks ran, when, and what they found. For readers who decide whether to trust Filigree, and for",
+                "developers. `scripts/reliability` writes this page from the counts of the last runs; do not edit it by hand."), "",
+         "    scripts/check            # what every change has to pass",
+         "    scripts/fuzz             # one of the longer searches below",
+         "    scripts/reliability      # then writes this page", "",
+         "A run is named by its date and its commit.", ""]
 for title, text in sections.items():
     if text:
         lines += [f"## {title}", "", *text, ""]

@@ -388,11 +388,11 @@ Result<PackedMesh> pack_mesh(const Mesh& mesh, const PackOptions& options, Packe
                              const RunContext& context) {
     if (options.bits < 10 || options.bits > 16)
         return Error{ErrorCode::usage,
-                     "Positions are coded with 10 to 16 bits; " + std::to_string(options.bits) + " were asked for."};
+                     "Positions are packed with 10 to 16 bits; " + std::to_string(options.bits) + " were asked for."};
     if (std::optional<Error> error = mesh_error(mesh)) return *error;
-    if (mesh.vertex_count() == 0) return Error{ErrorCode::unsuitable, "The mesh has no vertices: nothing to code."};
+    if (mesh.vertex_count() == 0) return Error{ErrorCode::unsuitable, "The mesh has no vertices: nothing to pack."};
     if (mesh.corner_count() >= kNoIndex / 4)
-        return Error{ErrorCode::unsuitable, "The mesh has more than a thousand million corners: too many to code."};
+        return Error{ErrorCode::unsuitable, "The mesh has more than a thousand million corners: too many to pack."};
     PackedMesh coded;
     coded.vertices = mesh.vertex_count();
     coded.faces = mesh.face_count();
@@ -450,11 +450,11 @@ Result<Mesh> unpack_mesh(const PackedMesh& coded, const RunContext& context) {
     try {
         Mesh mesh = decode(coded, context);
         if (const std::string wrong = check_mesh(mesh); !wrong.empty())
-            return Error{ErrorCode::bad_file, "The coded mesh is inconsistent: " + wrong};
+            return Error{ErrorCode::bad_file, "The packed mesh is inconsistent: " + wrong};
         return mesh;
     } catch (const Damage&) {
         if (context.is_cancelled()) return cancelled_error();
-        return Error{ErrorCode::bad_file, "The coded mesh is damaged."};
+        return Error{ErrorCode::bad_file, "The packed mesh is damaged."};
     }
 }
 

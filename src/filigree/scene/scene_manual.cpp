@@ -59,7 +59,7 @@ std::string spelled(const SceneKey& key, const Keyed<T>& value) {
 }
 
 std::string table_head(std::string_view table) {
-    return fmt::format("\n### `{}`\n\n| key | type | unit | unset | range | |\n|---|---|---|---|---|---|\n",
+    return fmt::format("\n### `{}`\n\n| key | type | unit | default | range | meaning |\n|---|---|---|---|---|---|\n",
                        shown_table(table));
 }
 
@@ -82,7 +82,7 @@ std::string or_never(double value) { return std::isinf(value) ? "" : fmt::format
 std::string materials_text() {
     std::string text =
         "\n### Materials\n\n| name | model | density | young_modulus | poisson_ratio | damping | internal_damping | "
-        "yield_stress | creep_time | melting_from, melting_to | viscosity | strength, energy | |\n"
+        "yield_stress | creep_time | melting_from, melting_to | viscosity | strength, energy | behaviour |\n"
         "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
     const SceneKey& model = *find_key("body", "model");
     for (const NamedMaterial& named : named_materials()) {

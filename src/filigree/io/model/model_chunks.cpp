@@ -100,7 +100,7 @@ Result<ModelChunks> ModelChunks::open(FileReader file, const std::string& name, 
     const Result<ModelOutline> outline = read_model_outline(file, name, context);
     if (!outline) return outline.error();
     if (outline->references > 0) return no_chunks(name, "has the reference code");
-    if (outline->coding) return no_chunks(name, "is coded in one piece");
+    if (outline->coding) return no_chunks(name, "is packed in one piece");
     Result<Mesh> driver = read_model_level(file, 0, name, context);
     if (!driver) return driver.error();
     auto content = std::make_unique<Content>(std::move(file), name);

@@ -274,7 +274,7 @@ FileCode read_file_code(const SectionReader& in) {
     const std::uint64_t most_driver = is_made_elsewhere(in) ? in.item_count<Vec3f>("cd.dpos") : code.vertices;
     if (code.precision > 1 || code.bits > 16 || code.driver_vertices == 0 || code.driver_vertices > most_driver ||
         (is_made_elsewhere(in) && code.driver_vertices != most_driver) || code.vertices >= kNoIndex)
-        throw FileDamage{"has coded parts that make no sense"};
+        throw FileDamage{"has packed parts that make no sense"};
     in.require_room(unpacked_bytes(code));
     return code;
 }
@@ -377,7 +377,7 @@ Model read_model_code(const SectionReader& in, Mesh rest, const RunContext& cont
     coded.rest = std::move(rest);
     Result<Mesh> mesh = unpack_mesh(coded, context);
     if (!mesh && mesh.error().code == ErrorCode::cancelled) throw mesh.error();
-    if (!mesh) throw FileDamage{"holds a coded mesh that is damaged", "pack it again"};
+    if (!mesh) throw FileDamage{"holds a packed mesh that is damaged", "pack it again"};
     if (is_made_elsewhere(in)) return bind_elsewhere(in, std::move(*mesh), code, context);
     Level driver = driver_of(in, code);
     if (code.keep_order && !std::ranges::is_sorted(driver.vertices)) throw FileDamage{"has a damaged driver"};

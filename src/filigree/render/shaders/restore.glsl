@@ -1,4 +1,4 @@
-// Restores the record of this vertex: hierarchy/blend_kernel.cpp in GLSL. GpuRestorer::bind fills what is read here.
+// Restores the record of this vertex: blend/blend_kernel.cpp in GLSL. GpuRestorer::bind fills what is read here.
 
 #ifdef RESTORE_INT16
 layout(location = 4) in uvec4 restore_record; // u v, x y, z and cell (two of 16 bits each); normal
