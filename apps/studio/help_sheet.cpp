@@ -7,10 +7,13 @@
 #include <QBoxLayout>
 #include <QDialog>
 #include <QDialogButtonBox>
+#include <QPainter>
 #include <QPushButton>
 #include <QScrollArea>
 
 #include <array>
+#include <utility>
+#include <vector>
 
 namespace filigree::studio {
 namespace {
@@ -72,15 +75,19 @@ public:
         for (const Gesture& gesture : kGestures) mouse += row(gesture.mouse, gesture.does);
         add(0, "Mouse", mouse);
         for (const Group& group : kGroups) {
-            QString rows;
+            std::vector<std::pair<QString, QStringList>> keys; // a key that two actions share is one row: Play, Pause
             for (const QAction* action : actions.all()) {
                 const QString menu = action->objectName().section('.', 0, 0) + ' ';
                 if (action->shortcut().isEmpty() || !QString(group.menus).split(' ').contains(menu.trimmed())) continue;
                 QString text = action->text().remove('&').remove(QChar(0x2026));
                 if (menu == "edit " && text.startsWith("Undo")) text = "Undo"; // without the step's name
                 if (menu == "edit " && text.startsWith("Redo")) text = "Redo";
-                rows += row(action->shortcut().toString(QKeySequence::NativeText), text);
+                const QString key = action->shortcut().toString(QKeySequence::NativeText);
+                if (keys.empty() || keys.back().first != key) keys.push_back({key, {}});
+                keys.back().second.append(text);
             }
+            QString rows;
+            for (const auto& [key, texts] : keys) rows += row(key, texts.join(", "));
             add(group.column, group.title, rows);
         }
         for (QVBoxLayout* one : column) one->addStretch(1);
@@ -99,6 +106,15 @@ public:
         layout->addWidget(buttons);
         const QSize wanted = page->sizeHint() + QSize(40, 70);
         resize(wanted.boundedTo(QSize(1100, 720)));
+    }
+
+private:
+    /// A border, for displays without a window manager.
+    void paintEvent(QPaintEvent* event) override {
+        QDialog::paintEvent(event);
+        QPainter painter(this);
+        painter.setPen(palette().color(QPalette::Mid));
+        painter.drawRect(rect().adjusted(0, 0, -1, -1));
     }
 };
 
