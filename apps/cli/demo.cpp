@@ -18,7 +18,8 @@ namespace filigree::cli {
 
 namespace {
 
-constexpr unsigned kDemoResolution = 264; // of the wavy cube, as large as the report's
+constexpr unsigned kDemoResolution =
+    264; // of the wavy cube, as large as the cube of the report Detail-Preserving Animation
 
 /// What the demo does to a mesh: a twist and a bend along one axis, as far as the mesh is slim enough not to fold.
 struct DemoWarp {
@@ -132,7 +133,7 @@ void run_demo(const DemoArguments& options, Session& session) {
     const VertexDistance& p = *positions_only.vertices;
     Report report;
     report.row("mesh", fmt::format("{} vertices, {} faces  ({})", with_commas(mesh.vertex_count()),
-                                   with_commas(mesh.face_count()), input.empty() ? "the report's wavy cube" : input));
+                                   with_commas(mesh.face_count()), input.empty() ? "the built-in wavy cube" : input));
     report.row("driver", fmt::format("{} vertices, stripped in {}", with_commas(model.driver().vertices.size()),
                                      seconds_text(strip_seconds)));
     report.row("deform every vertex", seconds_text(full_seconds));

@@ -172,7 +172,8 @@ Command strip_command() {
                  "Longest edge that simplification makes, fraction of the diagonal; flat parts then keep more vertices")
                  .above_zero(),
              choice<bool>("--code", options->with_reference_code, {{"blend", false}, {"reference", true}},
-                          "blend: for any mesh (default); reference: the report's method, for regular quads"),
+                          "blend: for any mesh (default); reference: the method of the report Detail-Preserving "
+                          "Animation, for regular quads"),
              choice<Precision>("--precision", strip.precision,
                                {{"float", Precision::float32}, {"int16", Precision::int16}},
                                "Blend code: float (20 bytes per vertex, default) or int16 (10 bytes)"),

@@ -55,7 +55,7 @@ public:
 
         rows = section("Report");
         none_ = text(rows, "quads.none", Tone::quiet);
-        none_->setText("Patches of regular quads, as the report's method needs them: whole levels of detail can go.");
+        none_->setText("Patches of regular quads: the reference code can take whole levels of detail off them.");
         figures_ = text(rows, "quads.figures");
         figures_->setTextFormat(Qt::RichText);
         remarks_ = text(rows, "quads.remarks", Tone::quiet);
