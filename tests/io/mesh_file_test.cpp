@@ -215,8 +215,10 @@ TEST(MeshFile, EndingsNameFormatsInAnyCase) {
     EXPECT_EQ(*mesh_format("A.OBJ"), MeshFormat::obj);
     EXPECT_EQ(*mesh_format("x.y/b.Ply"), MeshFormat::ply);
     for (const MeshFormatInfo& info : mesh_formats())
-        for (const std::string_view extension : {info.extension, info.other_extension})
-            if (!extension.empty()) EXPECT_EQ(*mesh_format("mesh" + std::string(extension)), info.format) << extension;
+        for (const std::string_view extension : {info.extension, info.other_extension}) {
+            if (extension.empty()) continue;
+            EXPECT_EQ(*mesh_format("mesh" + std::string(extension)), info.format) << extension;
+        }
     EXPECT_EQ(mesh_format("model.fbx").error().code, ErrorCode::unsupported);
     EXPECT_EQ(mesh_format("model").error().code, ErrorCode::unsupported);
 }
