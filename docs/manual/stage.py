@@ -17,6 +17,7 @@ import python_reference
 # The manual's order: what a reader needs first stands first. Every page of docs/ is in one of these; of a folder the
 # README.md, which links to the folder's other pages.
 PARTS = {
+    "Tutorials": ["tutorials/README"],
     "First steps": ["command-line", "python", "blender", "studio", "gallery"],
     "Guides": ["blend-code", "packing", "handles", "bodies", "bodies-theory", "scenes", "fracture", "melting", "remesh", "inside-points", "rendering", "exchange", "cluster", "web"],
     "File formats": ["formats", "animations", "fil-format"],
@@ -45,18 +46,23 @@ def stage(root, program, out):
     (reference / "sources.md").write_text(_sources(root))
     cpp_reference.write(root, reference)
     python_reference.write(reference)
-    (out / "index.md").write_text(_index(root))
+    (out / "index.md").write_text(_index(root, out))
 
 
 def _with_files_as_pages(path, root, out):
-    """A page whose links to files outside of docs/ lead to pages that show them."""
+    """A page of docs/ whose links to files outside of docs/ lead to pages that show them."""
     folder = path.parent.relative_to(out)
+    return _relinked(path.read_text(), r"\.\./[^)#]+", root / "docs" / folder, path, root, out)
 
+
+def _relinked(text, target, base, path, root, out):
+    """Links to files that `target` matches lead to pages that show the files; a link to a folder becomes its label."""
     def page_of(match):
-        label, target = match.group(1), match.group(2)
-        file = (root / "docs" / folder / target).resolve()
+        label, file = match.group(1), (base / match.group(2)).resolve()
+        if file.is_dir():
+            return label
         if not file.is_file():
-            sys.exit(f"stage.py: a link of {path.relative_to(out)} leads to nothing: {target}")
+            sys.exit(f"stage.py: a link of {path.relative_to(out)} leads to nothing: {match.group(2)}")
         if file.is_relative_to(root / "docs"):
             return match.group(0)
         relative = file.relative_to(root)
@@ -66,7 +72,7 @@ def _with_files_as_pages(path, root, out):
         page.write_text(f"---\norphan: true\n---\n\n# {relative}\n\n{fence}")
         return f"[{label}]({os.path.relpath(page, path.parent)})"
 
-    return re.sub(r"\[([^]]*)\]\((\.\./[^)#]+)\)", page_of, path.read_text())
+    return re.sub(rf"\[([^]]*)\]\(({target})\)", page_of, text)
 
 
 def _with_its_folder(readme):
@@ -121,10 +127,11 @@ def _commands(program):
     return "\n".join(lines)
 
 
-def _index(root):
+def _index(root, out):
     """The start page: the README up to its list of pages, and the parts for the sidebar."""
     readme = (root / "README.md").read_text().split("## Where to read on")[0]
-    lines = [re.sub(r"\]\((docs/)?", "](", readme)]
+    readme = _relinked(readme, r"(?!docs/|https?:)[^)#]+", root, out / "index.md", root, out)
+    lines = [re.sub(r"\]\(docs/", "](", readme)]
     parts = PARTS | {"Reference": ["reference/commands", "reference/cpp/index", "reference/python", "reference/sources"]}
     for part, names in parts.items():
         lines += ["```{toctree}", ":hidden:", ":maxdepth: 1", f":caption: {part}", "", *names, "```", ""]
