@@ -1,11 +1,11 @@
 #include "animation_output.h"
 #include "filigree/io/animation/point_cache.h"
+#include "filigree/io/system/platform.h"
 #include "restore_options.h"
 
 #include <set>
 
 #include <fmt/format.h>
-#include <sys/stat.h>
 
 namespace filigree::cli {
 
@@ -158,11 +158,11 @@ void check_animation_options(const std::vector<std::string>& paths, const Sessio
 }
 
 void check_not_input(const std::string& output, const std::vector<std::string>& inputs) {
-    std::set<std::pair<dev_t, ino_t>> taken; // whatever names lead there
-    const auto file_of = [](const fs::path& path) -> std::optional<std::pair<dev_t, ino_t>> {
-        struct stat status {};
-        if (::stat(path.c_str(), &status) != 0) return {};
-        return std::pair(status.st_dev, status.st_ino);
+    std::set<std::pair<std::uint64_t, std::uint64_t>> taken; // whatever names lead there
+    const auto file_of = [](const fs::path& path) -> std::optional<std::pair<std::uint64_t, std::uint64_t>> {
+        const std::optional<platform::Status> status = platform::status_of(path);
+        if (!status) return {};
+        return std::pair(status->device, status->number);
     };
     for (const std::string& input : inputs)
         for (const fs::path& path : animation_files(input))

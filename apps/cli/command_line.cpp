@@ -198,8 +198,8 @@ std::optional<int> refuse_words(const Program& program, std::span<const std::str
 }
 
 /// "help strip" is "strip --help".
-std::vector<std::string> words_of(int argc, char** argv) {
-    std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+std::vector<std::string> words_of(const std::vector<std::string>& arguments) {
+    std::vector<std::string> words(arguments.begin() + (arguments.empty() ? 0 : 1), arguments.end());
     if (words.empty() || words[0] != "help") return words;
     words.erase(words.begin());
     words.emplace_back("--help");
@@ -208,13 +208,13 @@ std::vector<std::string> words_of(int argc, char** argv) {
 
 } // namespace
 
-int run_command_line(const Program& program, Session& session, int argc, char** argv) {
+int run_command_line(const Program& program, Session& session, const std::vector<std::string>& arguments) {
     CLI::App app{program.text, program.name};
     app.set_version_flag("--version", program.name + " " + program.version);
     app.require_subcommand(1);
     app.footer("Examples:\n" + program.examples + "\n\n" + program.notes);
     for (const Command& command : program.commands) add(app, command, command.options + program.common, session);
-    const std::vector<std::string> words = words_of(argc, argv);
+    const std::vector<std::string> words = words_of(arguments);
     if (const std::optional<int> refused = refuse_words(program, words)) return *refused;
     try {
         app.parse(std::vector<std::string>(words.rbegin(), words.rend())); // which CLI11 wants from behind

@@ -24,12 +24,16 @@ Command simulate_command();
 Command sweep_command();
 Command export_command();
 Command figures_command();
+/// Those of them that do nothing but draw: none in a program that is built without the renderer.
+std::vector<Command> drawing_commands();
 
 inline std::vector<Command> all_commands() {
-    return {make_command(),     info_command(),    remesh_command(),   strip_command(),  level_command(),
-            deform_command(),   restore_command(), compare_command(),  bench_command(),  demo_command(),
-            render_command(),   sample_command(),  simulate_command(), export_command(), figures_command(),
-            fracture_command(), pack_command(),    unpack_command(),   sweep_command()};
+    std::vector<Command> commands = {
+        make_command(),    info_command(),     remesh_command(), strip_command(),  level_command(),  deform_command(),
+        restore_command(), compare_command(),  bench_command(),  demo_command(),   sample_command(), simulate_command(),
+        export_command(),  fracture_command(), pack_command(),   unpack_command(), sweep_command()};
+    for (Command& command : drawing_commands()) commands.push_back(std::move(command));
+    return commands;
 }
 
 } // namespace filigree::cli

@@ -1,8 +1,5 @@
 #include "commands.h"
-#include "pictures.h"
-
-#include "filigree/present/error_picture.h"
-#include "filigree/present/page.h"
+#include "drawing.h"
 
 #include <cmath>
 
@@ -17,23 +14,6 @@ struct CompareArguments {
     std::optional<UpAxis> up;
     std::size_t samples = 100'000;
 };
-
-/// a coloured by how far each of its vertices is from b, with a legend; the vertices' rms and maximum stand below.
-void draw_errors(const Mesh& a, const Mesh& b, const std::string& names, const MeshDistance& distance, UpAxis up,
-                 const std::string& path, Session& session) {
-    const RunContext& context = session.context();
-    const HeatMap errors =
-        heat_map(distance.vertices ? distance.vertices->per_vertex : require(distances_to_surface(a, b, context)),
-                 distance.diagonal);
-    double sum = 0, most = 0;
-    for (float value : errors.values) {
-        sum += double(value) * value;
-        most = std::max(most, double(value));
-    }
-    const std::string caption = fmt::format("{}: rms {:.2e}, max {:.2e} of the diagonal", names,
-                                            std::sqrt(sum / std::max<double>(1, double(errors.values.size()))), most);
-    require(write_error_picture(a, errors, "distance / diagonal", caption, up, path, context));
-}
 
 /// The distances: fractions of the diagonal under a key, model units under the key with "_units".
 void report_distances(const MeshDistance& distance, Report& report) {
@@ -75,8 +55,7 @@ void run(const CompareArguments& options, Session& session) {
     report_distances(distance, report);
     if (!options.picture.empty()) {
         const UpAxis up = up_of(options.up, a, options.a);
-        draw_errors(a, b, Page::plain(file_name(options.a)) + " against " + Page::plain(file_name(options.b)), distance,
-                    up, options.picture, session);
+        draw_distances(a, b, {file_name(options.a), file_name(options.b)}, distance, up, options.picture, session);
         report.row("picture", options.picture);
         report_picture(options.picture, up, report);
     }

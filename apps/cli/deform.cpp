@@ -6,6 +6,7 @@
 
 #include "filigree/deform/warp_steps.h"
 #include "filigree/io/animation/handles_file.h"
+#include "filigree/io/system/extension.h"
 #include "filigree/io/system/file.h"
 
 #include <fmt/format.h>

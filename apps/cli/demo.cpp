@@ -1,5 +1,5 @@
 #include "commands.h"
-#include "demo_pictures.h"
+#include "drawing.h"
 #include "output_folder.h"
 #include "restore_options.h"
 
@@ -51,24 +51,6 @@ struct DemoWarp {
         return make_chain(std::move(warps));
     }
 };
-
-/// Neither is what the demo is about: where one cannot be made (no OpenGL, no ffmpeg, no room) it goes on with a
-/// warning. Returns the files.
-std::vector<std::string> draw_and_film(const DemoScene& scene, const std::function<Pose(double)>& pose_at,
-                                       const std::string& picture, const std::string& film, Session& session) {
-    std::vector<std::string> made;
-    try {
-        HeadlessRenderer renderer = require(HeadlessRenderer::create());
-        draw_demo(scene, renderer, picture, session);
-        made.push_back(picture);
-        film_demo(scene, pose_at, renderer, film, session);
-        made.push_back(film);
-    } catch (const Failure& failure) {
-        if (failure.error.code == ErrorCode::cancelled) throw;
-        session.warn(failure.error.message);
-    }
-    return made;
-}
 
 struct DemoArguments {
     std::string input, output = "filigree-demo";
@@ -124,7 +106,7 @@ void run_demo(const DemoArguments& options, Session& session) {
     if (!no_pictures && mesh.face_count() > 0) {
         const DemoScene scene{mesh, model, pose, restored, with_gradients, up};
         const auto pose_at = [&](double part) { return warp_pose(*deformation.warp(part), model, context); };
-        pictures_made = draw_and_film(scene, pose_at, picture_file, film_file, session);
+        pictures_made = draw_demo(scene, pose_at, picture_file, film_file, session);
     }
     files.keep();
 

@@ -27,7 +27,7 @@ Camera camera_around(std::span<const CameraPoints> points, UpAxis up, double asp
 
 } // namespace
 
-void draw_demo(const DemoScene& scene, HeadlessRenderer& renderer, const std::string& path, Session& session) {
+void draw_demo_panels(const DemoScene& scene, HeadlessRenderer& renderer, const std::string& path, Session& session) {
     const RunContext& context = session.context();
     const double aspect = double(kPanelWidth) / kPanelHeight;
     const CameraPoints before{scene.mesh.positions, scene.mesh.origin},

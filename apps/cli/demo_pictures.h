@@ -1,26 +1,14 @@
 // What the demo shows: one picture of the whole job, and a film of it.
 #pragma once
 
-#include "pictures.h"
-
-#include "filigree/mesh.h"
-#include "filigree/restore.h"
+#include "picture_files.h"
 
 #include <string>
 
 namespace filigree::cli {
 
-struct DemoScene {
-    const Mesh& mesh;          ///< as it came
-    const Model& model;        ///< stripped
-    const Pose& pose;          ///< of the driver, deformed
-    const Mesh& restored;      ///< for the camera and its size; what is drawn is restored by the vertex shader
-    const MeshDistance& error; ///< of the restored mesh against the full deformation
-    UpAxis up;
-};
-
 /// Five panels: mesh, driver, moved driver, restored mesh, its error as colours with a legend.
-void draw_demo(const DemoScene& scene, HeadlessRenderer& renderer, const std::string& path, Session& session);
+void draw_demo_panels(const DemoScene& scene, HeadlessRenderer& renderer, const std::string& path, Session& session);
 
 /// The mesh from rest to the pose and back; pose_at(t), t from 0 to 1, gives the driver on the way. Of large meshes a
 /// lower level is shown, the finest with at most 150,000 triangles.

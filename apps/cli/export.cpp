@@ -10,6 +10,7 @@
 #include "filigree/io/gltf/gltf.h"
 #include "filigree/io/mesh/material_file.h"
 #include "filigree/io/model/model_file.h"
+#include "filigree/io/system/extension.h"
 #include "filigree/io/system/file.h"
 
 #include <filesystem>

@@ -1,7 +1,7 @@
 #include "commands.h"
 
 #include "output_folder.h"
-#include "pictures.h"
+#include "picture_files.h"
 
 #include "report/figures.h"
 

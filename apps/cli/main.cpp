@@ -3,6 +3,8 @@
 #include "session.h"
 #include "usage_errors.h"
 
+#include "filigree/io/system/platform.h"
+
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -10,9 +12,6 @@
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
-
-#include <malloc.h>
-#include <unistd.h>
 
 using namespace filigree;
 
@@ -52,11 +51,12 @@ int print_manual(const cli::Program& program, const std::string& command) {
     return is_written ? 0 : exit_code(ErrorCode::unwritable);
 }
 
-int run(int argc, char** argv) {
+int run(const std::vector<std::string>& arguments) {
     cli::Session session;
     const cli::Program program = make_program(session);
-    if (argc > 1 && argc <= 3 && std::string(argv[1]) == "--man") return print_manual(program, argc > 2 ? argv[2] : "");
-    return cli::run_command_line(program, session, argc, argv);
+    const std::size_t count = arguments.size();
+    if (count > 1 && count <= 3 && arguments[1] == "--man") return print_manual(program, count > 2 ? arguments[2] : "");
+    return cli::run_command_line(program, session, arguments);
 }
 
 int fail(const Error& error) {
@@ -74,18 +74,10 @@ int own_error(const std::exception& error) {
     return kOwnError;
 }
 
-/// Whether this is a thread for which there was no room: std::thread says so by its code, TBB in its message alone.
+/// Whether this is a thread for which there was no room.
 bool is_thread_refused(const std::exception& error) {
     const auto* system = dynamic_cast<const std::system_error*>(&error);
-    if (system) return system->code() == std::errc::resource_unavailable_try_again;
-    return std::string_view(error.what()).starts_with("pthread_create");
-}
-
-/// Buffers of a few megabytes that come and go (a chunk of a model, a frame) stay with the program: to give them back
-/// and have them again costs a page fault every 4 KiB, more than what is done with them.
-void keep_freed_memory() {
-    mallopt(M_MMAP_THRESHOLD, 32 << 20);
-    mallopt(M_TRIM_THRESHOLD, 256 << 20);
+    return system && system->code() == std::errc::resource_unavailable_try_again;
 }
 
 /// Where memory ends in a destructor (nlohmann's JSON takes some when it goes), no exception comes here.
@@ -96,8 +88,8 @@ void keep_freed_memory() {
         try {
             std::rethrow_exception(thrown);
         } catch (const std::bad_alloc&) {
-            [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kLine.data(), kLine.size());
-            ::_exit(static_cast<int>(ErrorCode::out_of_memory));
+            platform::write(platform::kStandardError, kLine);
+            platform::end_process(static_cast<int>(ErrorCode::out_of_memory));
         } catch (...) {
         }
     }
@@ -107,10 +99,12 @@ void keep_freed_memory() {
 } // namespace
 
 int main(int argc, char** argv) {
-    keep_freed_memory();
+    // Buffers of a few megabytes come and go (a chunk of a model, a frame): to give them back and have them again costs
+    // a page fault every 4 KiB, more than what is done with them.
+    platform::keep_freed_memory();
     std::set_terminate(end_at_once);
     try {
-        return run(argc, argv);
+        return run(platform::arguments(argc, argv));
     } catch (const cli::Failure& failure) {
         return fail(failure.error);
     } catch (const cli::Doubt& doubt) {

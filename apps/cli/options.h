@@ -144,7 +144,8 @@ struct Program {
 void refuse_to_overwrite_inputs(const OptionList& options);
 
 /// Runs the command that the arguments name, or prints the help or version that they ask for; returns the exit code.
-int run_command_line(const Program& program, Session& session, int argc, char** argv);
+/// The first argument is the program's own name.
+int run_command_line(const Program& program, Session& session, const std::vector<std::string>& arguments);
 
 /// The manual page (troff, section 1) of the program, or of the command of this name; empty: there is none.
 std::string manual_page(const Program& program, const std::string& command = {});

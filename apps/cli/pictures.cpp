@@ -1,7 +1,6 @@
 #include "pictures.h"
 
 #include "filigree/core/color.h"
-#include "filigree/io/system/file.h"
 #include "filigree/mesh/up_axis.h"
 
 #include <filesystem>
@@ -40,39 +39,8 @@ void report_picture(const std::string& path, UpAxis up, Report& report) {
     report.set("up", kUpAxes[std::size_t(up)].first);
 }
 
-Camera camera_for(const Mesh& mesh, View view, UpAxis up, double aspect, double point_radius) {
-    std::vector<Vec3f> room;
-    const CameraPoints points = points_of_faces(mesh, room, point_radius);
-    return fit_camera(std::span(&points, 1), view_direction(view, up), up_vector(up), aspect);
-}
-
 std::string file_name(const std::string& path) {
     return path == "-" ? "standard input" : std::filesystem::path(path).filename().string();
-}
-
-void check_picture_path(const std::string& path) {
-    const std::string ending = lower_extension(path);
-    if (ending != ".png" && ending != ".svg" && ending != ".pdf")
-        refuse(ErrorCode::unsupported, path + ": is no picture's name; let it end in .png, .svg or .pdf.");
-    check_folder_of(path);
-}
-
-void check_png_path(const std::string& path) {
-    if (lower_extension(path) != ".png")
-        refuse(ErrorCode::unsupported, path + ": the picture is a PNG; let its name end in .png.");
-    check_picture_path(path);
-}
-
-void write_picture(const Picture& picture, const std::string& path, Session& session) {
-    if (session.context().is_cancelled()) throw Failure{cancelled_error()};
-    require(write_file(path, encode_png(picture)));
-}
-
-void write_picture_of(const Scene& scene, const Camera& camera, const PictureOptions& options, const std::string& path,
-                      HeadlessRenderer& renderer, Session& session) {
-    const Picture picture = require(renderer.picture(scene, camera, options, session.context()));
-    session.begin_writing(path);
-    write_picture(picture, path, session);
 }
 
 } // namespace filigree::cli

@@ -1,8 +1,7 @@
 #include "commands.h"
-#include "pictures.h"
+#include "drawing.h"
 #include "session.h"
 
-#include "filigree/present/patch_drawing.h"
 #include "filigree/remesh.h"
 
 #include <fmt/format.h>
@@ -158,17 +157,6 @@ void report_remesh(const QuadRemeshed& result, const RunSeconds& run, Report& re
     report_seconds(remesh, run, report);
 }
 
-void draw_patches(const QuadRemeshed& result, UpAxis up, const RemeshArguments& options, Session& session) {
-    const RunContext& context = session.context();
-    HeadlessRenderer renderer = require(HeadlessRenderer::create());
-    const PatchDrawing drawing = require(PatchDrawing::create(result.mesh, result.patches, 0.8f, context));
-    Scene scene;
-    drawing.add_to(scene);
-    scene.up = up;
-    write_picture_of(scene, camera_for(result.mesh, options.view, up, 4.0 / 3), {.width = 1600, .height = 1200},
-                     options.picture, renderer, session);
-}
-
 /// Before any work: what cannot be written.
 void check_outputs(const RemeshArguments& options) {
     if (options.output != "-") require(mesh_format(options.output));
@@ -188,7 +176,7 @@ void run(RemeshArguments options, Session& session) {
     if (!options.base.empty()) session.write_mesh(base_mesh(result), options.base);
     const double written = now_seconds();
     const UpAxis up = up_of(options.up, mesh, options.input);
-    if (!options.picture.empty()) draw_patches(result, up, options, session);
+    if (!options.picture.empty()) draw_quads(result, options.view, up, options.picture, session);
 
     Report report;
     report.set("output", options.output);

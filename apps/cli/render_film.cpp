@@ -5,13 +5,11 @@
 #include "filigree/io/system/file_batch.h"
 #include "filigree/io/system/file_error.h"
 #include "filigree/io/system/numbered_name.h"
+#include "filigree/io/system/platform.h"
 #include "filigree/present/film_frames.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <utility>
-
-#include <unistd.h>
 
 #include <fmt/format.h>
 
@@ -111,8 +109,8 @@ private:
         if (!batch) return batch.error();
         for (std::size_t k = 0; k < pictures.size(); ++k) {
             if (Status free = batch->check_place(pictures[k]); !free) return free;
-            if (::link(file(k).c_str(), batch->path(pictures[k]).c_str()) != 0)
-                return cannot_write(folder / pictures[k], errno);
+            if (const int failed = platform::link(file(k), batch->path(pictures[k])))
+                return cannot_write(folder / pictures[k], failed);
         }
         return batch->finish();
     }

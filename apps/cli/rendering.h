@@ -1,7 +1,7 @@
 // Meshes and models as `filigree render` draws them: read, coloured, posed, put into a scene.
 #pragma once
 
-#include "pictures.h"
+#include "picture_files.h"
 #include "restore_options.h"
 
 #include "filigree/io/system/file.h"

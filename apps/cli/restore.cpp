@@ -1,7 +1,7 @@
 #include "animation_output.h"
 #include "chunks.h"
 #include "commands.h"
-#include "pictures.h"
+#include "drawing.h"
 #include "reference.h"
 #include "restore_options.h"
 
@@ -11,8 +11,6 @@
 #include "filigree/io/system/file.h"
 #include "filigree/levels/vertex_order.h"
 #include "filigree/mesh/surfels.h"
-#include "filigree/present/error_picture.h"
-#include "filigree/present/page.h"
 
 #include <filesystem>
 
@@ -115,24 +113,16 @@ void check(const RestoreArguments& options, const Session& session) {
 
 const char* source_of(const Pose& pose) { return pose.gradients.empty() ? "positions" : "positions and gradients"; }
 
-/// The restored mesh, coloured by where it is expected to be off.
-void draw_expected_error(const Model& model, const PoseError::Estimate& estimate, const Mesh& mesh,
-                         const RestoreArguments& options, Session& session, Report& report) {
-    const UpAxis up = up_of(options.up, model.mesh, options.model);
-    const std::string caption = fmt::format("{}: expected error {:.2e} of the diagonal (rms)",
-                                            Page::plain(file_name(options.output)), estimate.share());
-    require(write_error_picture(mesh, expected_error_map(model, estimate), "expected / diagonal", caption, up,
-                                options.picture, session.context()));
-    report.say(fmt::format("{}: where it is expected\n", options.picture));
-    report_picture(options.picture, up, report);
-}
-
 void report_expected_error(const Model& model, const Pose& pose, const PoseError::Estimate& estimate, const Mesh& mesh,
                            const RestoreArguments& options, Session& session, Report& report) {
     if (!(estimate.diagonal > 0)) return;
     report.say(fmt::format("Expected error: {:.2g} of the diagonal (rms).\n", estimate.share()));
     note_expected_error(estimate, model, pose, report, session);
-    if (!options.picture.empty()) draw_expected_error(model, estimate, mesh, options, session, report);
+    if (options.picture.empty()) return;
+    const UpAxis up = up_of(options.up, model.mesh, options.model);
+    draw_expected_error(model, estimate, mesh, file_name(options.output), up, options.picture, session);
+    report.say(fmt::format("{}: where it is expected\n", options.picture));
+    report_picture(options.picture, up, report);
 }
 
 /// The mesh's surfels, made at rest and carried to where it is now.

@@ -1,5 +1,5 @@
 #include "commands.h"
-#include "pictures.h"
+#include "drawing.h"
 #include "session.h"
 
 #include "filigree/sample.h"
@@ -29,28 +29,6 @@ const std::vector<std::pair<std::string, InsideMethod>> kMethods = {{"auto", Ins
                                                                     {"scan", InsideMethod::scan},
                                                                     {"rays", InsideMethod::rays},
                                                                     {"winding", InsideMethod::winding}};
-
-/// Points blue, surface red, the half of the surface towards the viewer cut away.
-void draw_points(const Mesh& mesh, const std::vector<Vec3f>& points, double spacing, UpAxis up, const std::string& path,
-                 Session& session) {
-    const RunContext& context = session.context();
-    HeadlessRenderer renderer = require(HeadlessRenderer::create());
-    const Drawable surface = require(Drawable::surface(mesh, {}, context));
-    const Vec3d direction = view_direction(View::iso, up), axis = up_vector(up);
-    const Vec3d towards = (direction - axis * axis.dot(direction)).normalized();
-    Scene scene{.objects = {{&surface,
-                             {.color = {0.80f, 0.22f, 0.18f},
-                              .own_colors = false,
-                              .clip = ClipPlane{towards, towards.dot(surface.box().centre())}}}},
-                .up = up};
-    std::optional<Drawable> balls;
-    if (!points.empty()) {
-        balls = require(Drawable::points(points, mesh.origin, {.radius = static_cast<float>(0.32 * spacing)}, context));
-        scene.objects.push_back({&*balls, {.color = {0.20f, 0.42f, 0.80f}}});
-    }
-    write_picture_of(scene, camera_for(mesh, View::iso, up, 4.0 / 3), {.width = 1280, .height = 960}, path, renderer,
-                     session);
-}
 
 /// Points inside, and how they were found.
 struct Found {
@@ -166,7 +144,7 @@ void run(SampleArguments options, Session& session) {
     Report report = make_report(found, options.output);
     if (!options.picture.empty()) {
         const UpAxis up = up_of(options.up, mesh, options.input);
-        draw_points(mesh, cloud.positions, found.spacing, up, options.picture, session);
+        draw_points_inside(mesh, cloud.positions, found.spacing, up, options.picture, session);
         report_picture(options.picture, up, report);
     }
     session.print(report);

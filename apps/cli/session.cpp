@@ -2,12 +2,12 @@
 
 #include "filigree/io/model/model_file.h"
 #include "filigree/io/system/file.h"
+#include "filigree/io/system/platform.h"
 
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
-#include <unistd.h>
 
 #include <fmt/format.h>
 
@@ -21,8 +21,8 @@ volatile std::sig_atomic_t is_waiting_for_input = 0; // where nothing looks at t
 void on_interrupt(int signal) {
     if (is_waiting_for_input) {
         constexpr std::string_view kLine = "filigree: Cancelled; nothing was written.\n";
-        [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kLine.data(), kLine.size());
-        ::_exit(static_cast<int>(ErrorCode::cancelled));
+        platform::write(platform::kStandardError, kLine);
+        platform::end_process(static_cast<int>(ErrorCode::cancelled));
     }
     cancel_target->cancel();
     if (signal == SIGINT) std::signal(SIGINT, SIG_DFL); // a second Ctrl-C ends the program at once
@@ -115,7 +115,7 @@ std::string Session::settings_but(const std::vector<std::string>& options) const
 
 void Session::begin() {
     context_.emplace(threads);
-    if (!quiet && isatty(STDERR_FILENO))
+    if (!quiet && platform::is_terminal(platform::kStandardError))
         context_->progress = [bar = std::make_shared<ProgressBar>()](std::string_view phase, double fraction) {
             bar->draw(phase, fraction);
             if (fraction >= 1) bar->clear();
@@ -123,9 +123,11 @@ void Session::begin() {
     cancel_target = &*context_;
     std::signal(SIGINT, on_interrupt);
     std::signal(SIGTERM, on_interrupt);
+#if !defined(_WIN32)
     if (std::signal(SIGHUP, on_interrupt) == SIG_IGN) std::signal(SIGHUP, SIG_IGN); // under nohup
     std::signal(SIGPIPE, SIG_IGN);
     std::signal(SIGXFSZ, SIG_IGN); // a file that may not grow fails like a full disk, and is removed
+#endif
 }
 
 RunContext Session::silent_context() const {

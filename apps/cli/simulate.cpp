@@ -1,13 +1,12 @@
 #include "animation_output.h"
 #include "commands.h"
+#include "drawing.h"
 #include "simulate_report.h"
 
 #include "filigree/io/animation/point_cache.h"
 #include "filigree/io/system/extension.h"
 #include "filigree/io/system/file.h"
 #include "filigree/io/system/numbered_name.h"
-#include "filigree/present/scene_film.h"
-#include "filigree/present/textured_look.h"
 #include "filigree/scene/finer_check.h"
 #include "filigree/scene/melting_surface.h"
 #include "filigree/scene/scene_keys.h"
@@ -50,7 +49,7 @@ struct Outputs {
                 folders.push_back(path);
             else if (lower_extension(path) == ".fil")
                 models.push_back(path);
-            else if (is_film_path(path))
+            else if (is_film(path))
                 films.push_back(path);
             else if (is_animation_path(path))
                 animations.push_back(path);
@@ -156,7 +155,7 @@ public:
                                               ": --finer cannot judge bodies that break, as finer ones would "
                                               "break elsewhere; take [[fracture]] out of the scene.");
         if (options.frames) scene_.frames = options.frames;
-        open_outputs();
+        if (!outputs_.films.empty()) films_.emplace(outputs_.films, scene_);
         ready_ = require(set_up(scene_, session.context()));
         session.warn(ready_.warnings);
         run_.emplace(require(SceneRun::create(scene_, ready_, options.check, session.context())));
@@ -183,10 +182,9 @@ public:
             save();
         }
         const double start = now_seconds();
-        if (!films_.empty()) {
-            film();
-            for (const std::string& path : outputs_.films) session_.begin_writing(path);
-            for (FilmWriter& film : films_) require(film.finish());
+        if (films_) {
+            films_->write(scene_, ready_, run_->recording(), session_);
+            film_seconds_ = now_seconds() - start;
         }
         for (std::size_t b = 0; b < ready_.bodies.size(); ++b) {
             ready_.bodies[b].model.mesh.origin = ready_.origin;
@@ -238,11 +236,7 @@ private:
 
     MeltingSurface melting_surface() {
         const RunContext silent = session_.silent_context();
-        if (!looks_) {
-            std::vector<std::string> warnings;
-            looks_ = require(looks_of(ready_, warnings, silent));
-            session_.warn(warnings);
-        }
+        if (!looks_) looks_ = looks_of_bodies(ready_, session_);
         return require(MeltingSurface::create(ready_, *looks_, silent));
     }
 
@@ -297,18 +291,6 @@ private:
             }
         }
     }
-    void film() {
-        const double start = now_seconds();
-        session_.warn(require(film_scene(scene_, ready_, run_->recording(), *renderer_, films_, session_.context())));
-        film_seconds_ = now_seconds() - start;
-    }
-    void open_outputs() {
-        if (!outputs_.films.empty()) renderer_.emplace(require(HeadlessRenderer::create()));
-        for (const std::string& path : outputs_.films)
-            films_.push_back(require(FilmWriter::create(path, scene_.picture.size[0], scene_.picture.size[1],
-                                                        scene_.step.frames_per_second)));
-    }
-
     void save() { require(write_file(options_.save, run_->save())); }
 
     [[noreturn]] void cancelled() {
@@ -347,8 +329,7 @@ private:
     Session& session_;
     SceneFile scene_;
     Outputs outputs_;
-    std::optional<HeadlessRenderer> renderer_;
-    std::vector<FilmWriter> films_;
+    std::optional<SceneFilms> films_;
     ReadyScene ready_;
     std::optional<SceneRun> run_;
     std::optional<std::vector<BodyLook>> looks_;

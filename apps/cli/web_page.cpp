@@ -1,6 +1,7 @@
 #include "web_page.h"
 
 #include "filigree/io/system/file.h"
+#include "filigree/io/system/platform.h"
 
 #include <cstdlib>
 #include <fstream>
@@ -20,7 +21,7 @@ fs::path find_parts() {
     if (const char* named = std::getenv("FILIGREE_WEB"); named && *named)
         folder = named;
     else
-        folder = fs::read_symlink("/proc/self/exe", failed).parent_path() / FILIGREE_WEB_FROM_PROGRAM;
+        folder = platform::own_program().parent_path() / FILIGREE_WEB_FROM_PROGRAM;
     if (fs::exists(folder / "filigree.js", failed)) return folder;
     refuse(ErrorCode::unsupported,
            folder.lexically_normal().string() +

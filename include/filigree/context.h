@@ -10,13 +10,15 @@
 
 #include "filigree/result.h"
 
-#include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <string_view>
 
 namespace filigree {
+
+class LoopBody;
 
 /// Passed by const reference to every long call. Cheap to copy; copies share the cancel flag and the threads.
 class RunContext {
@@ -32,22 +34,20 @@ public:
     std::uint64_t seed = 1;
 
     unsigned threads() const { return threads_; }
-    /// Calls work() so that oneTBB inside it, and so Embree, uses no more threads than these.
-    void execute(const std::function<void()>& work) const;
 
     /// Asks the call to stop: it returns the error `cancelled`. Safe from any thread and from a signal handler.
-    void cancel() const { cancelled_->store(true, std::memory_order_relaxed); }
-    bool is_cancelled() const { return cancelled_->load(std::memory_order_relaxed); }
+    void cancel() const;
+    bool is_cancelled() const;
 
     void report(std::string_view phase, double fraction) const {
         if (progress) progress(phase, fraction);
     }
 
 private:
-    struct Arena; ///< oneTBB's: no header includes it, or every file would compile it
+    struct Shared; ///< by copies
+    friend void run_pieces(const RunContext&, std::size_t, std::size_t, const LoopBody&);
     unsigned threads_;
-    std::shared_ptr<Arena> arena_;
-    std::shared_ptr<std::atomic<bool>> cancelled_;
+    std::shared_ptr<Shared> shared_;
 };
 
 /// The error that cancelled work returns.

@@ -93,7 +93,7 @@ TEST(ClosestPointTree, AgreesWithBruteForceToTheBit) {
                 triangles[t] = {Index(random() % 30), Index(random() % 30), Index(random() % 30)};
                 if (t % 3 == 1) triangles[t][0] = triangles[t - 1][2], triangles[t][1] = triangles[t - 1][1];
             }
-            const ClosestPointTree tree(positions, triangles, round % 2 ? TreeLeaves::pairs : TreeLeaves::single);
+            const ClosestPointTree tree(positions, triangles);
             for (int i = 0; i < 50; ++i) {
                 const float times = i % 5 ? 1.0f : 100.0f;
                 const Vec3f query = times * (point() - point() / 3);
@@ -110,13 +110,12 @@ TEST(ClosestPointTree, AgreesWithBruteForceToTheBit) {
 TEST(ClosestPointTree, AgreesWithBruteForceOnASmoothSurface) {
     const Mesh mesh = make_wavy_sphere({.resolution = 12});
     const std::vector<Triangle> triangles = triangulate(mesh).triangles;
-    const ClosestPointTree tree(mesh.positions, triangles), pairs(mesh.positions, triangles, TreeLeaves::pairs);
+    const ClosestPointTree tree(mesh.positions, triangles);
     std::mt19937 random(4);
     const auto coordinate = [&] { return float(random() % 100000) / 50000 - 1; };
     for (int i = 0; i < 300; ++i) {
         const Vec3f query(coordinate(), coordinate(), coordinate());
         expect_same(tree.closest(query), brute_force(mesh.positions, triangles, query));
-        expect_same(pairs.closest(query), tree.closest(query));
     }
     for (std::size_t v = 0; v < mesh.vertex_count(); ++v) { // a vertex is on its own triangles, the lowest wins
         expect_same(tree.closest(mesh.positions[v]), brute_force(mesh.positions, triangles, mesh.positions[v]));
@@ -137,14 +136,12 @@ TEST(ClosestPointTree, AgreesWithBruteForceOnNeedles) { // which have several bo
     }
     triangles.push_back({0, 1, 0}); // a line, and a point
     triangles.push_back({7, 7, 7});
-    for (const TreeLeaves leaves : {TreeLeaves::single, TreeLeaves::pairs}) {
-        const ClosestPointTree tree(positions, triangles, leaves);
-        for (int i = 0; i < 500; ++i) {
-            const Vec3f query = Vec3f(coordinate(), coordinate(), coordinate()) * (i % 7 ? 1.0f : 30.0f);
-            expect_same(tree.closest(query), brute_force(positions, triangles, query));
-            const Vec3f facing(coordinate(), coordinate(), coordinate());
-            expect_same(tree.closest(query, 0.1, facing), brute_force(positions, triangles, query, 0.1, facing));
-        }
+    const ClosestPointTree tree(positions, triangles);
+    for (int i = 0; i < 500; ++i) {
+        const Vec3f query = Vec3f(coordinate(), coordinate(), coordinate()) * (i % 7 ? 1.0f : 30.0f);
+        expect_same(tree.closest(query), brute_force(positions, triangles, query));
+        const Vec3f facing(coordinate(), coordinate(), coordinate());
+        expect_same(tree.closest(query, 0.1, facing), brute_force(positions, triangles, query, 0.1, facing));
     }
 }
 

@@ -29,8 +29,7 @@ void do_work(const std::shared_ptr<Job>& job) {
     job->changed.notify_one();
 }
 
-/// A thread that does one job after the other. Libraries keep something for every thread that ever called them (Embree
-/// a few kilobytes), so threads are kept.
+/// A thread that does one job after the other: to start one takes longer than a small job.
 class Worker {
 public:
     Worker() : thread_([this] { work(); }) {}

@@ -147,12 +147,11 @@ void bind_to_closest(std::span<const Vec3f> positions, std::span<const Triangle>
     Index first = 0;
     while (first < positions.size() && !is_unbound(first)) ++first;
     if (first == positions.size()) return;
-    std::optional<ClosestPointTree> tree; // Embree builds on the threads of the arena it is called in
-    context.execute([&] { tree.emplace(positions, cells); });
+    const ClosestPointTree tree(positions, cells, context);
     parallel_for(context, positions.size(), 1 << 12, [&](std::size_t begin, std::size_t end) {
         if (context.is_cancelled()) return;
         for (Index v = Index(begin); v < end; ++v)
-            if (is_unbound(v)) bonds[v] = bond_at(tree->closest(positions[v]));
+            if (is_unbound(v)) bonds[v] = bond_at(tree.closest(positions[v]));
     });
 }
 

@@ -1,6 +1,7 @@
 #include "filigree/blend/blend_code.h"
 
 #include "filigree/blend/blend_kernel.h"
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 
 #include <algorithm>
@@ -117,9 +118,9 @@ double scale_inside(double driver, double all) {
     constexpr double kSmall = 1e-15, kLarge = 1e15, kLargest = 1e30;
     const double size = driver > 0 ? driver : all;
     if (!(size > 0) || (size >= kSmall && size <= kLarge && all <= kLargest)) return 1;
-    const double wanted = std::round(std::log2(size));
-    const double least = std::ceil(std::log2(all / kLargest));
-    return std::exp2(-std::min(std::max(wanted, least), 127.0));
+    const double wanted = std::round(math::log2(size));
+    const double least = std::ceil(math::log2(all / kLargest));
+    return math::exp2(-std::min(std::max(wanted, least), 127.0));
 }
 
 struct WantedRecord {

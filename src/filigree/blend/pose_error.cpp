@@ -2,6 +2,7 @@
 
 #include "filigree/blend/gradient_fit.h"
 #include "filigree/blend/sampled_restorer.h"
+#include "filigree/core/math.h"
 #include "filigree/core/random.h"
 
 #include <algorithm>
@@ -36,17 +37,17 @@ struct Wave {
         const auto unit = [&](std::uint64_t k) {
             const double z = between(k, -1, 1), angle = between(k + 1, 0, 2 * std::numbers::pi);
             const double r = std::sqrt(1 - z * z);
-            return Vec3d(r * std::cos(angle), r * std::sin(angle), z);
+            return Vec3d(r * math::cos(angle), r * math::sin(angle), z);
         };
         direction = amplitude * diagonal * unit(0);
         wave = between(2, 1, 2) * std::numbers::pi / diagonal * unit(3);
         phase = between(5, 0, 2 * std::numbers::pi);
     }
     Vec3f position(const Vec3f& p) const {
-        return (p.cast<double>() + std::sin(wave.dot(p.cast<double>()) + phase) * direction).cast<float>();
+        return (p.cast<double>() + math::sin(wave.dot(p.cast<double>()) + phase) * direction).cast<float>();
     }
     Mat3f gradient(const Vec3f& p) const {
-        const double slope = std::cos(wave.dot(p.cast<double>()) + phase);
+        const double slope = math::cos(wave.dot(p.cast<double>()) + phase);
         return (Mat3d::Identity() + slope * direction * wave.transpose()).cast<float>();
     }
 };
@@ -92,10 +93,10 @@ private:
             const double true_error = restorer.rms_distance(moved, gradients, truth, context);
             const double estimate = error.estimate_unscaled(moved, gradients).rms;
             if (std::min(true_error, estimate) < kWithRounding * diagonal) continue;
-            logarithms += std::log(true_error / estimate);
+            logarithms += math::log(true_error / estimate);
             ++count;
         }
-        return count > 0 ? std::exp(logarithms / count) : kUsualFactor;
+        return count > 0 ? math::exp(logarithms / count) : kUsualFactor;
     }
 };
 

@@ -53,16 +53,15 @@ std::vector<Triangle> link_driver(const WorkingMesh& work, std::size_t first_dri
     std::vector<Triangle> links;
     const std::span<const Triangle> triangles = work.surface.triangles;
     if (triangles.empty()) return links;
-    std::optional<ClosestPointTree> tree; // Embree builds on the threads of the arena it is called in
-    context.execute([&] { tree.emplace(work.positions, triangles); });
+    const ClosestPointTree tree(work.positions, triangles, context);
     const std::size_t count = work.positions.size() - first_driver_vertex;
     links.resize(2 * count);
     parallel_for(context, count, 1 << 10, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const auto v = static_cast<Index>(first_driver_vertex + i);
             SurfacePoint point =
-                tree->closest(work.positions[v], std::numeric_limits<double>::infinity(), work.normals[v]);
-            if (point.triangle == kNoIndex) point = tree->closest(work.positions[v]);
+                tree.closest(work.positions[v], std::numeric_limits<double>::infinity(), work.normals[v]);
+            if (point.triangle == kNoIndex) point = tree.closest(work.positions[v]);
             const Triangle& t = triangles[point.triangle];
             links[2 * i] = {v, t[0], t[1]};
             links[2 * i + 1] = {v, t[1], t[2]};

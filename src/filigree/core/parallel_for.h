@@ -7,7 +7,7 @@
 
 namespace filigree {
 
-/// A loop's body, called through one pointer: oneTBB's templates are then compiled once and not in every loop.
+/// A loop's body, called through one pointer, so that the loop itself is compiled once.
 class LoopBody {
 public:
     template <class Body>
@@ -26,7 +26,8 @@ void run_pieces(const RunContext& context, std::size_t count, std::size_t grain,
 
 /// Calls body(begin, end) for consecutive pieces of [0, count), each of `grain` indices (the last may be shorter).
 /// Pieces run in any order and at the same time, so a body writes only what its own indices own; the pieces
-/// themselves do not depend on the number of threads. Small loops run inline.
+/// themselves do not depend on the number of threads. A loop of one piece runs inline. The first exception of a body
+/// stops the loop and is thrown again. Loops inside loops share the context's threads.
 template <class Body>
 void parallel_for(const RunContext& context, std::size_t count, std::size_t grain, const Body& body) {
     run_pieces(context, count, grain, LoopBody(body));

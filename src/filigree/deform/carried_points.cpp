@@ -1,5 +1,6 @@
 #include "filigree/deform/carried_points.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh.h"
 
@@ -18,7 +19,7 @@ std::vector<Vec3f> carried_points(std::span<const Vec3f> rest, std::span<const V
     const std::size_t step = (driver.size() + most - 1) / most;
     // In a box of about one unit: by powers of two, so that no digit changes, and units of any size serve.
     const double size = bounds(driver).size().norm();
-    const float to_unit = size > 0 ? std::exp2(float(-std::clamp(std::ilogb(size), -126, 126))) : 1;
+    const float to_unit = size > 0 ? math::exp2(float(-std::clamp(std::ilogb(size), -126, 126))) : 1;
     const float least = 1e-6f * float(size * double(to_unit) * size * double(to_unit));
     parallel_for(context, rest.size(), 64, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {

@@ -1,5 +1,6 @@
 #include "filigree/pose.h"
 
+#include "filigree/core/math.h"
 #include "filigree/mesh.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/normals.h"
@@ -37,7 +38,7 @@ public:
     explicit NearestVertices(const Mesh& driver, const RunContext& context) : positions_(driver.positions) {
         points_.reserve(positions_.size());
         for (Index v = 0; v < positions_.size(); ++v) points_.push_back({v, v, v});
-        context.execute([&] { tree_.emplace(positions_, points_); }); // Embree builds on the arena's threads
+        tree_.emplace(positions_, points_, context);
     }
     /// The lowest of equally near ones.
     Index operator()(const Vec3f& place) const {
@@ -98,8 +99,9 @@ Result<Targets> handle_targets(std::span<const HandleRegion> handles, const Cand
         Vec3d centre = Vec3d::Zero();
         for (const Index v : *held) centre += from.world[v] / double(held->size());
         centre = handle.centre.value_or(centre);
+        const Mat3d turn = math::matrix(handle.rotation);
         for (const Index v : *held)
-            if (!targets.emplace(v, centre + handle.rotation * (from.world[v] - centre) + handle.move).second)
+            if (!targets.emplace(v, centre + turn * (from.world[v] - centre) + handle.move).second)
                 return wrong_handle(name + " shares a vertex with an earlier handle: keep their regions apart.");
     }
     return targets;

@@ -7,6 +7,7 @@
 #include "filigree/pose.h"
 
 #include "filigree/core/dense_solve.h"
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/normals.h"
 
@@ -145,7 +146,7 @@ void RbfWarp::solve(std::span<const Vec3d> centres, std::span<const Vec3d> displ
     }
     Eigen::MatrixXd kernel(n, n), affine(n, 4);
     for (Eigen::Index i = 0; i < n; ++i)
-        for (Eigen::Index j = 0; j < n; ++j) kernel(i, j) = std::pow((u.row(i) - u.row(j)).norm(), 3);
+        for (Eigen::Index j = 0; j < n; ++j) kernel(i, j) = math::pow((u.row(i) - u.row(j)).norm(), 3);
     affine << u, Eigen::VectorXd::Ones(n);
 
     const Eigen::MatrixXd z = orthogonal_complement(affine);
@@ -232,7 +233,7 @@ std::unique_ptr<SpaceWarp> make_bend(const Box& box, Axis axis, double degrees) 
         const double x = f.clamp(p[f.along]) - f.centre[f.along], beyond = p[f.along] - f.centre[f.along] - x;
         const double y = p[f.across] - f.centre[f.across];
         // An arc of length x that turns by 2 h has a chord of length x sin(h) / h in the direction h.
-        const double h = 0.5 * curvature * x, sin_h = std::sin(h), cos_h = std::cos(h);
+        const double h = 0.5 * curvature * x, sin_h = math::sin(h), cos_h = math::cos(h);
         const double chord = h == 0 ? x : x * sin_h / h;
         const double sine = 2 * sin_h * cos_h, cosine = 1 - 2 * sin_h * sin_h;
         const double stretch = f.contains(p[f.along]) ? 1 - curvature * y : 1;
@@ -253,7 +254,7 @@ std::unique_ptr<SpaceWarp> make_twist(const Box& box, Axis axis, double degrees)
     if (f.thin) return make_identity();
     return make_warp([f, rate = radians(degrees) / f.length](const Vec3d& p) {
         const double angle = rate * (f.clamp(p[f.along]) - f.centre[f.along]);
-        const double sine = std::sin(angle), cosine = std::cos(angle);
+        const double sine = math::sin(angle), cosine = math::cos(angle);
         const double y = p[f.across] - f.centre[f.across], z = p[f.across2] - f.centre[f.across2];
         const double turned_y = cosine * y - sine * z, turned_z = sine * y + cosine * z;
         const double slope = f.contains(p[f.along]) ? rate : 0;
@@ -302,12 +303,12 @@ std::unique_ptr<SpaceWarp> make_smooth_random(const Box& box, double amplitude, 
     }
     for (Bump& bump : bumps) bump.displacement *= amplitude * box.diagonal() / longest;
 
-    const double inverse_variance = 1 / std::pow(kBumpDeviation * box.diagonal(), 2);
+    const double inverse_variance = 1 / math::pow(kBumpDeviation * box.diagonal(), 2);
     return make_warp([bumps, inverse_variance](const Vec3d& p) {
         Warped result{p, Mat3d::Identity()};
         for (const Bump& bump : bumps) {
             const Vec3d d = p - bump.centre;
-            const double height = std::exp(-0.5 * inverse_variance * d.squaredNorm());
+            const double height = math::exp(-0.5 * inverse_variance * d.squaredNorm());
             result.position += height * bump.displacement;
             result.gradient -= bump.displacement * (inverse_variance * height * d).transpose();
         }

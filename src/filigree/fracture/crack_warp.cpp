@@ -1,5 +1,6 @@
 #include "filigree/fracture/crack_warp.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/random.h"
 
 #include <Eigen/LU>
@@ -15,7 +16,7 @@ constexpr double kSteepest = 5;   ///< sum of |gradient| of value_noise is below
 constexpr double kMostBending = 0.9;
 constexpr double kGridShare = 0.98; ///< of the grid's half, so that rounding stays within
 
-double gain_of(int octave) { return std::pow(2.0, -kHurst * octave); }
+double gain_of(int octave) { return math::pow(2.0, -kHurst * octave); }
 
 } // namespace
 
@@ -64,7 +65,7 @@ Vec3d value_noise(const Vec3d& point, std::uint64_t seed, Mat3d* gradient) {
 CrackWarp::CrackWarp(const CrackWarpOptions& options) : centre_(options.box.centre()), seed_(options.seed) {
     if (options.roughness > 0) {
         double bending = 0;
-        for (int octave = 0; octave < kOctaves; ++octave) bending += kSteepest * std::exp2(octave) * gain_of(octave);
+        for (int octave = 0; octave < kOctaves; ++octave) bending += kSteepest * math::exp2(double(octave)) * gain_of(octave);
         const double amplitude = options.roughness * kMostBending / bending * options.wavelength;
         frequency_ = 1 / options.wavelength;
         for (int octave = 0; octave < kAllOctaves; ++octave)
@@ -86,7 +87,7 @@ double CrackWarp::reach() const {
     return sum;
 }
 
-double CrackWarp::finest_wavelength() const { return is_rough() ? std::exp2(1 - kOctaves) / frequency_ : 0; }
+double CrackWarp::finest_wavelength() const { return is_rough() ? math::exp2(1.0 - kOctaves) / frequency_ : 0; }
 
 Vec3d CrackWarp::noise(const Vec3d& point, Mat3d* gradient) const {
     Vec3d sum = Vec3d::Zero();

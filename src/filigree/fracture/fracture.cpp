@@ -1,5 +1,6 @@
 #include "filigree/fracture.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/now_seconds.h"
 #include "filigree/fracture/piece_assembly.h"
 #include "filigree/sample/closure.h"
@@ -17,8 +18,8 @@ constexpr double kPlanarEdge = 1.0 / 6, kRoughEdge = 1.0 / 20; ///< of a piece's
 
 /// How far a piece of average volume is across.
 double piece_size(const CutSurface& cut, Index cells) {
-    const double thinnest = 1e-3 * std::pow(cut.box.diagonal(), 3);
-    return std::cbrt(std::max(std::abs(cut.volume), thinnest) / double(cells));
+    const double thinnest = 1e-3 * math::pow(cut.box.diagonal(), 3);
+    return math::cbrt(std::max(std::abs(cut.volume), thinnest) / double(cells));
 }
 
 /// The pieces' sizes, and how far they are from adding up.

@@ -1,6 +1,7 @@
 #include "filigree/fracture.h"
 
 #include "filigree/core/dense_solve.h"
+#include "filigree/core/math.h"
 #include "filigree/core/random.h"
 #include "filigree/fracture/cell_clumps.h"
 #include "filigree/fracture/crack_warp.h"
@@ -68,7 +69,7 @@ Result<Matter> matter_of(const Mesh& mesh, Index pieces, const RunContext& conte
                                                     : Result<std::vector<Vec3d>>(lattice.error());
         if (inside && inside->size() >= pieces) {
             matter.points = std::move(*inside);
-            matter.piece_size = *spacing * std::cbrt(double(matter.points.size()) / pieces);
+            matter.piece_size = *spacing * math::cbrt(double(matter.points.size()) / pieces);
             matter.spacing = *spacing;
             return matter;
         }
@@ -98,7 +99,7 @@ std::vector<Vec3d> draw(std::span<const Vec3d> points, std::span<const double> w
                         std::uint64_t seed) {
     std::vector<std::pair<double, Index>> keys(points.size());
     for (Index k = 0; k < points.size(); ++k)
-        keys[k] = {std::log(1 - random_unit(seed, k)) / (weights.empty() ? 1 : weights[k]), k};
+        keys[k] = {math::log(1 - random_unit(seed, k)) / (weights.empty() ? 1 : weights[k]), k};
     const std::size_t drawn = std::min<std::size_t>(count, keys.size());
     std::partial_sort(keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(drawn), keys.end(), std::greater<>());
     std::vector<Vec3d> seeds;
@@ -145,9 +146,9 @@ std::vector<Vec3d> rings(const Vec3d& centre, const Vec3d& x, const Vec3d& y, do
             const auto jitter = [&](std::uint64_t which) {
                 return random_unit(seed, 2 * (c * rays + r) + which) - 0.5;
             };
-            const double radius = reach * std::pow((c + 0.5 + 0.4 * jitter(0)) / circles, 1.6);
+            const double radius = reach * math::pow((c + 0.5 + 0.4 * jitter(0)) / circles, 1.6);
             const double angle = 2 * std::numbers::pi * (r + 0.35 * random_unit(seed + 1, r) + 0.25 * jitter(1)) / rays;
-            seeds.push_back(centre + radius * (std::cos(angle) * x + std::sin(angle) * y));
+            seeds.push_back(centre + radius * (math::cos(angle) * x + math::sin(angle) * y));
         }
     return seeds;
 }
@@ -161,7 +162,7 @@ Result<std::vector<Vec3d>> radial_seeds(const Matter& matter, const FracturePatt
     double reach = 0;
     for (const Vec3d& p : matter.points) {
         const Vec3d off = p - centre;
-        reach = std::max(reach, std::hypot(off.dot(axes.col(1)), off.dot(axes.col(2))));
+        reach = std::max(reach, math::hypot(off.dot(axes.col(1)), off.dot(axes.col(2))));
     }
     std::vector<Vec3d> seeds;
     warp.roughness = 0;
@@ -187,7 +188,7 @@ std::vector<double> grain_density(const Matter& matter, std::uint64_t seed) {
     std::vector<double> density;
     const double wavelength = kGrainWavelength * matter.piece_size;
     for (const Vec3d& p : matter.points)
-        density.push_back(std::exp(kGrainContrast * value_noise(p / wavelength, seed, nullptr)[0]));
+        density.push_back(math::exp(kGrainContrast * value_noise(p / wavelength, seed, nullptr)[0]));
     return density;
 }
 
@@ -224,7 +225,7 @@ Result<FractureCells> make_fracture_cells(const Mesh& mesh, const FracturePatter
         if (!warp.grain.allFinite() || warp.grain.isZero())
             return Error{ErrorCode::usage, "The grain of slabs has no direction."};
         // Across the grain pieces are thinner than they are on average.
-        warp.wavelength /= std::cbrt(pattern.stretch);
+        warp.wavelength /= math::cbrt(pattern.stretch);
     }
 
     std::vector<Vec3d> seeds;
@@ -241,7 +242,7 @@ Result<FractureCells> make_fracture_cells(const Mesh& mesh, const FracturePatter
         const double near = 0.05 * warp.box.diagonal();
         for (const Vec3d& p : matter->points) {
             double weight = 0;
-            for (const Vec3d& hit : hits) weight += std::pow((p - hit).squaredNorm() / (near * near) + 1, -2);
+            for (const Vec3d& hit : hits) weight += math::pow((p - hit).squaredNorm() / (near * near) + 1, -2);
             weights.push_back(weight);
         }
         seeds = draw(matter->points, weights, count, context.seed);

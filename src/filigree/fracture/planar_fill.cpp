@@ -1,6 +1,7 @@
 #include "filigree/fracture/planar_fill.h"
 
 #include "filigree/core/disjoint_sets.h"
+#include "filigree/core/math.h"
 #include "filigree/fracture/constrained_delaunay.h"
 
 #include <algorithm>
@@ -131,7 +132,7 @@ public:
 private:
     double distance(Index a, Index b) const {
         const PlanePoint &p = mesh_.point(a), &q = mesh_.point(b);
-        return std::hypot(double(p[0] - q[0]), double(p[1] - q[1]));
+        return math::hypot(double(p[0] - q[0]), double(p[1] - q[1]));
     }
     double wanted(Index face) const {
         const auto& v = mesh_.face(face).vertices;

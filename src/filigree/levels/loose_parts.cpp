@@ -104,15 +104,13 @@ float mean_edge(std::span<const Vec3f> positions, std::span<const Triangle> cell
 class ClosestCorner {
 public:
     ClosestCorner(std::span<const Vec3f> positions, std::span<const Triangle> triangles, const RunContext& context)
-        : triangles_(triangles) {
-        context.execute([&] { tree_.emplace(positions, triangles); }); // Embree builds on its arena's threads
-    }
+        : triangles_(triangles), tree_(positions, triangles, context) {}
     struct Found {
         double distance = std::numeric_limits<double>::infinity();
         Index vertex = kNoIndex;
     };
     Found find(const Vec3f& point) const {
-        const SurfacePoint closest = tree_->closest(point);
+        const SurfacePoint closest = tree_.closest(point);
         if (closest.triangle == kNoIndex) return {};
         Eigen::Index corner = 0;
         closest.barycentric.maxCoeff(&corner);
@@ -121,7 +119,7 @@ public:
 
 private:
     std::span<const Triangle> triangles_;
-    std::optional<ClosestPointTree> tree_;
+    ClosestPointTree tree_;
 };
 
 std::vector<ClosestCorner::Found> nearest_beside(std::span<const Vec3f> positions, const LooseVertices& loose,

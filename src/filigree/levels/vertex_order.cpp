@@ -3,7 +3,8 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/morton.h"
 
-#include <tbb/parallel_sort.h>
+#include <array>
+#include <numeric>
 
 namespace filigree {
 
@@ -19,18 +20,32 @@ void put_in_order(std::vector<T>& values, std::span<const Index> order, const Ru
     values = std::move(moved);
 }
 
+constexpr unsigned kDigit = 10; // bits; three of them are a place along Morton's curve
+
+/// Stable, so that vertices at one place stay as they come.
+std::vector<Index> sorted_by_place(std::span<const std::uint32_t> places) {
+    std::vector<Index> order(places.size()), sorted(places.size());
+    std::iota(order.begin(), order.end(), Index{0});
+    for (unsigned shift = 0; shift < 3 * kDigit; shift += kDigit) {
+        const auto digit = [&](Index v) { return places[v] >> shift & ((1u << kDigit) - 1); };
+        std::array<Index, (1u << kDigit) + 1> begin{};
+        for (const Index v : order) ++begin[digit(v) + 1];
+        std::partial_sum(begin.begin(), begin.end(), begin.begin());
+        for (const Index v : order) sorted[begin[digit(v)]++] = v;
+        order.swap(sorted);
+    }
+    return order;
+}
+
 } // namespace
 
 std::vector<Index> order_by_place(const Mesh& mesh, const RunContext& context) {
     const MortonOrder places(bounds(mesh.positions));
-    std::vector<std::uint64_t> keys(mesh.vertex_count()); // the place, then the vertex
-    parallel_for(context, keys.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t v = begin; v < end; ++v) keys[v] = std::uint64_t(places.key(mesh.positions[v])) << 32 | v;
+    std::vector<std::uint32_t> at(mesh.vertex_count());
+    parallel_for(context, at.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t v = begin; v < end; ++v) at[v] = places.key(mesh.positions[v]);
     });
-    context.execute([&] { tbb::parallel_sort(keys.begin(), keys.end()); });
-    std::vector<Index> order(keys.size());
-    for (std::size_t i = 0; i < keys.size(); ++i) order[i] = static_cast<Index>(keys[i]);
-    return order;
+    return sorted_by_place(at);
 }
 
 Mesh with_vertex_order(Mesh mesh, std::span<const Index> order, const RunContext& context) {

@@ -11,7 +11,7 @@
 namespace filigree {
 
 /// The vertices along Morton's curve over the mesh's box, 1,024 steps an axis; at one place as they come. The mesh
-/// is not checked. Cost O(V log V).
+/// is not checked. Cost O(V).
 std::vector<Index> order_by_place(const Mesh& mesh, const RunContext& context);
 
 /// The mesh whose vertex i was vertex order[i]; order has each vertex once. Faces, and attributes of faces and corners,

@@ -1,5 +1,6 @@
 #include "filigree/melting/particle_field.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/melting/field_surface.h"
 #include "filigree/melting/particle_kernels.h"
@@ -171,7 +172,7 @@ double enclosed_volume(const BlockGrid& grid, const std::vector<float>& values, 
                 width > 0 ? std::clamp(0.5f + value / width, 0.0f, 1.0f) : float(value > 0);
         }
     });
-    return std::accumulate(of_block.begin(), of_block.end(), 0.0) * std::pow(grid.cell(), 3);
+    return std::accumulate(of_block.begin(), of_block.end(), 0.0) * math::pow(grid.cell(), 3);
 }
 
 /// Of a closed mesh of triangles.

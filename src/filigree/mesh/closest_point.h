@@ -1,6 +1,7 @@
 // The closest point on a set of triangles, exactly, many times.
 #pragma once
 
+#include "filigree/context.h"
 #include "filigree/mesh.h"
 
 #include <memory>
@@ -19,18 +20,13 @@ struct SurfacePoint {
 /// it is the closest point of the edges. `triangle` is left at kNoIndex. Method: [Ericson 2005, 5.1], in double.
 SurfacePoint closest_point_on_triangle(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c);
 
-/// What a leaf of the tree holds. Pairs: a triangle and the one after it, where they share an edge, as the halves of a
-/// quad do. Half the time to build and up to a third more for a query, so for trees with fewer queries than triangles;
-/// the answers are the same.
-enum class TreeLeaves { single, pairs };
-
-/// A bounding-volume hierarchy over triangles (Embree). Built once in O(F log F), asked in about O(log F); queries
+/// A bounding-volume hierarchy over triangles. Built once in O(F log F), asked in about O(log F); queries
 /// from many threads at once are safe. Copies nothing: positions and triangles must outlive it. Any scale that floats
 /// can hold will do. The constructor throws std::bad_alloc when there is no memory for the hierarchy.
 class ClosestPointTree {
 public:
     ClosestPointTree(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
-                     TreeLeaves leaves = TreeLeaves::single);
+                     const RunContext& context = RunContext());
     ~ClosestPointTree();
     ClosestPointTree(ClosestPointTree&&) noexcept;
     ClosestPointTree& operator=(ClosestPointTree&&) noexcept;

@@ -1,3 +1,4 @@
+#include "filigree/core/math.h"
 #include "filigree/mesh.h"
 #include "filigree/mesh/measured_surface.h"
 
@@ -38,7 +39,7 @@ double percentile(std::vector<double>& values, double fraction) {
 }
 
 double angle_deg(const Vec3d& a, const Vec3d& b) {
-    return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi; // exact near 0, where acos is not
+    return math::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi; // exact near 0, where acos is not
 }
 
 void compare_normals(std::span<const Vec3f> normals_a, std::span<const Vec3f> normals_b, VertexDistance& result) {
@@ -132,11 +133,6 @@ void search_in_turn(std::span<const Vec3f> samples, const PlacedTriangles& to, c
     }
 }
 
-/// The tree that suits so many samples.
-TreeLeaves leaves_for(std::size_t samples, const PlacedTriangles& to) {
-    return samples < to.triangles.size() ? TreeLeaves::pairs : TreeLeaves::single;
-}
-
 /// The distance of every sample to a surface; fewer when cancelled.
 std::vector<double> distances(std::span<const Vec3f> samples, const PlacedTriangles& to, const ClosestPointTree& tree,
                               const RunContext& context) {
@@ -153,17 +149,9 @@ std::vector<double> distances(std::span<const Vec3f> samples, const PlacedTriang
     return result;
 }
 
-std::unique_ptr<ClosestPointTree> make_distance_tree(const PlacedTriangles& to, TreeLeaves leaves,
-                                                     const RunContext& context) {
-    std::unique_ptr<ClosestPointTree> tree; // Embree builds on the threads of the arena it is called in
-    context.execute([&] { tree = std::make_unique<ClosestPointTree>(to.positions, to.triangles, leaves); });
-    return tree;
-}
-
 /// The same, with a tree for this alone.
 std::vector<double> distances(std::span<const Vec3f> samples, const PlacedTriangles& to, const RunContext& context) {
-    const auto tree = make_distance_tree(to, leaves_for(samples.size(), to), context);
-    return distances(samples, to, *tree, context);
+    return distances(samples, to, ClosestPointTree(to.positions, to.triangles, context), context);
 }
 
 SurfaceDistance surface_distance(const std::vector<double>& there, const std::vector<double>& back) {
@@ -214,13 +202,7 @@ struct MeasuredSurface::Content {
     Vec3d origin;
     std::size_t sample_count;
     std::vector<Vec3f> samples;
-    std::unique_ptr<ClosestPointTree> pairs, single;
-
-    const ClosestPointTree& tree(TreeLeaves leaves, const RunContext& context) {
-        std::unique_ptr<ClosestPointTree>& known = leaves == TreeLeaves::pairs ? pairs : single;
-        if (!known) known = make_distance_tree(surface, leaves, context);
-        return *known;
-    }
+    std::optional<ClosestPointTree> tree; ///< made when it is asked for the first time
 };
 
 MeasuredSurface::MeasuredSurface(std::unique_ptr<Content> content) : content_(std::move(content)) {}
@@ -244,8 +226,8 @@ Result<SurfaceDistance> MeasuredSurface::distance_of(const Mesh& other, const Ru
     const Result<PlacedTriangles> placed = place_triangles(other, other.origin - own.origin, context);
     if (!placed) return placed.error();
     const std::vector<Vec3f> samples = sample_surface(*placed, own.sample_count, context.seed);
-    const ClosestPointTree& tree = own.tree(leaves_for(samples.size(), own.surface), context);
-    const std::vector<double> there = distances(samples, own.surface, tree, context);
+    if (!own.tree) own.tree.emplace(own.surface.positions, own.surface.triangles, context);
+    const std::vector<double> there = distances(samples, own.surface, *own.tree, context);
     const std::vector<double> back = distances(own.samples, *placed, context);
     if (context.is_cancelled()) return cancelled_error();
     return surface_distance(there, back);

@@ -3,6 +3,8 @@
 //   [Shirley 1997] (the cylinder's caps; we use their map for the whole cross-section)
 #include "filigree/mesh.h"
 
+#include "filigree/core/math.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -19,12 +21,12 @@ constexpr double kMaxCorners = 4294967295.0;
 double sin_turns(double t) {
     double r = t - std::nearbyint(t);
     if (std::abs(r) > 0.25) r = std::copysign(0.5, r) - r;
-    return std::sin(2 * std::numbers::pi * r);
+    return math::sin(2 * std::numbers::pi * r);
 }
 double cos_turns(double t) {
     const double r = std::abs(t - std::nearbyint(t)); // the cosine is even
     if (r > 0.125 && r < 0.375) return sin_turns(0.25 - r);
-    return r > 0.25 ? -std::cos(2 * std::numbers::pi * (0.5 - r)) : std::cos(2 * std::numbers::pi * r);
+    return r > 0.25 ? -math::cos(2 * std::numbers::pi * (0.5 - r)) : math::cos(2 * std::numbers::pi * r);
 }
 
 /// Where lattice line i of n lies in -1 to 1; mirrored lines have opposite bits.
@@ -156,7 +158,7 @@ Mesh make_wavy_cube(const ShapeOptions& options) {
 Mesh make_wavy_sphere(const ShapeOptions& options) {
     const std::size_t n = options.resolution;
     std::vector<double> spread(n + 1); // equal angles rather than equal steps: quads of about the same size
-    for (std::size_t i = 0; i <= n; ++i) spread[i] = std::tan(std::numbers::pi / 4 * centred(i, n));
+    for (std::size_t i = 0; i <= n; ++i) spread[i] = math::tan(std::numbers::pi / 4 * centred(i, n));
     return BoxSurface({n, n, n}).mesh([&](const Lattice& p) {
         const Vec3d d = Vec3d(spread[p[0]], spread[p[1]], spread[p[2]]).normalized();
         // the gyroid's field: smooth all over the sphere for every frequency, and within -1.5 to 1.5

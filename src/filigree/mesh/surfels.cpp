@@ -1,5 +1,6 @@
 #include "filigree/mesh/surfels.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/text.h"
 #include "filigree/mesh.h"
 #include "filigree/mesh/normals.h"
@@ -90,8 +91,9 @@ struct Axes {
 
 Axes principal_axes(const Vec3f& u, const Vec3f& v) {
     const float uu = u.squaredNorm(), vv = v.squaredNorm(), uv = u.dot(v);
-    const float angle = 0.5f * std::atan2(2 * uv, uu - vv);
-    const Vec3f first = std::cos(angle) * u + std::sin(angle) * v, second = std::cos(angle) * v - std::sin(angle) * u;
+    const float angle = 0.5f * math::atan2(2 * uv, uu - vv);
+    const Vec3f first = math::cos(angle) * u + math::sin(angle) * v,
+                second = math::cos(angle) * v - math::sin(angle) * u;
     return {first, second}; // the angle turns towards the longer one
 }
 
@@ -215,7 +217,7 @@ std::optional<Surfels> surfels_of_points(const Mesh& mesh) {
 
 Mesh surfel_polygons(const Surfels& surfels) {
     constexpr int kSides = 8;
-    const float reach = 1 / std::cos(std::numbers::pi_v<float> / kSides); // so that the octagon holds the ellipse
+    const float reach = 1 / math::cos(std::numbers::pi_v<float> / kSides); // so that the octagon holds the ellipse
     Mesh mesh;
     mesh.origin = surfels.origin;
     for (std::size_t i = 0; i < surfels.size(); ++i) {
@@ -224,7 +226,7 @@ Mesh surfel_polygons(const Surfels& surfels) {
             const float angle = 2 * std::numbers::pi_v<float> * float(k) / kSides;
             corners[std::size_t(k)] = Index(mesh.positions.size());
             mesh.positions.push_back(surfels.positions[i] +
-                                     reach * (std::cos(angle) * surfels.u[i] + std::sin(angle) * surfels.v[i]));
+                                     reach * (math::cos(angle) * surfels.u[i] + math::sin(angle) * surfels.v[i]));
             if (!surfels.colors.empty()) mesh.colors.push_back(surfels.colors[i]);
             mesh.normals.corners.push_back(Index(i));
         }

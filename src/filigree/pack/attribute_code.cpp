@@ -1,5 +1,6 @@
 #include "filigree/pack/attribute_code.h"
 
+#include "filigree/core/math.h"
 #include "filigree/mesh/edges.h"
 #include "filigree/pack/integer_frame.h"
 #include "filigree/pack/wedge.h"
@@ -449,8 +450,8 @@ private:
             if (!normalise(guess)) continue;
             double along = 0;
             for (std::size_t k = 0; k < 3; ++k) along += double(normal[int(k)]) * double(guess[k]) / double(kOne);
-            const double angle = std::acos(std::clamp(along, -1.0, 1.0));
-            const double bits = 2 * std::log2(1 + double(kOctahedron) * angle) + (g == last_guess_ ? 0 : kGuessBits);
+            const double angle = math::acos(std::clamp(along, -1.0, 1.0));
+            const double bits = 2 * math::log2(1 + double(kOctahedron) * angle) + (g == last_guess_ ? 0 : kGuessBits);
             if (bits >= fewest) continue;
             fewest = bits;
             best = g;

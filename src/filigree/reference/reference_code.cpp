@@ -1,6 +1,7 @@
 // Based on: the report, 2.4 and 2.5.
 #include "filigree/reference/reference_code.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/reference/reference_plan.h"
 
@@ -124,7 +125,7 @@ private:
 
 /// The number of levels whose driver comes closest to the vertices asked for.
 unsigned levels_for(std::size_t vertices, std::size_t base) {
-    const double levels = std::log2(double(std::max<std::size_t>(vertices, 1)) / double(base)) / 2;
+    const double levels = math::log2(double(std::max<std::size_t>(vertices, 1)) / double(base)) / 2;
     return static_cast<unsigned>(std::max(1L, std::lround(levels)));
 }
 

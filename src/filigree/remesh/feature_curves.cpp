@@ -1,6 +1,7 @@
 #include "filigree/remesh/feature_curves.h"
 
 #include "filigree/core/disjoint_sets.h"
+#include "filigree/core/math.h"
 #include "filigree/mesh/edges.h"
 #include "filigree/remesh/manifold_surface.h"
 #include "filigree/types.h"
@@ -181,7 +182,7 @@ std::vector<std::uint8_t> find_corners(const Curves& curves, double reach) {
         const Index a = curves.edges[v][0].end, b = curves.edges[v][1].end;
         if (a == b) continue;
         const Vec3d to_a = chord(curves, v, a, reach), to_b = chord(curves, v, b, reach);
-        turn[v] = static_cast<float>(std::numbers::pi - std::atan2(to_a.cross(to_b).norm(), to_a.dot(to_b)));
+        turn[v] = static_cast<float>(std::numbers::pi - math::atan2(to_a.cross(to_b).norm(), to_a.dot(to_b)));
     }
     std::vector<std::uint8_t> corners(vertex_count, 0);
     for (Index v = 0; v < vertex_count; ++v) {
@@ -224,7 +225,7 @@ FeatureCurves find_feature_curves(const ManifoldSurface& surface, std::span<cons
             const Vec3d &n = normals[h / 3], &m = normals[twins[h] / 3];
             // a triangle without an area has no normal, and its edges are not sharp
             const double angle =
-                n.squaredNorm() > 0 && m.squaredNorm() > 0 ? std::atan2(n.cross(m).norm(), n.dot(m)) : 0;
+                n.squaredNorm() > 0 && m.squaredNorm() > 0 ? math::atan2(n.cross(m).norm(), n.dot(m)) : 0;
             if (angle > least) angles[h] = static_cast<float>(angle);
         }
     prune(surface, twins, options, angles);

@@ -4,6 +4,7 @@
 #include "filigree/remesh/manifold_surface.h"
 
 #include "filigree/core/disjoint_sets.h"
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh.h"
 #include "filigree/mesh/edges.h"
@@ -279,7 +280,7 @@ private:
         for (const Index h : edge) {
             if (opposite_[h] != kNoIndex) continue;
             const Vec3d arm = positions_[half_edge_apex(triangles_, h)] - low;
-            around_.emplace_back(std::atan2(v.dot(arm), u.dot(arm)), h);
+            around_.emplace_back(math::atan2(v.dot(arm), u.dot(arm)), h);
         }
         std::ranges::sort(around_);
         open_.clear();

@@ -1,5 +1,7 @@
 #include "filigree/remesh/patch_layout.h"
 
+#include "filigree/core/math.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -16,9 +18,9 @@ PatchLayout plan_patches(std::size_t quads, std::optional<unsigned> levels) {
     PatchLayout layout;
     layout.levels = levels.value_or(1);
     if (!levels)
-        while (layout.levels < kMostQuadLevels && double(quads) / std::pow(4.0, layout.levels + 1) >= kEnoughPatches)
+        while (layout.levels < kMostQuadLevels && double(quads) / math::pow(4.0, layout.levels + 1) >= kEnoughPatches)
             ++layout.levels;
-    const double patches = double(quads) / std::pow(4.0, layout.levels);
+    const double patches = double(quads) / math::pow(4.0, layout.levels);
     layout.patches = std::max<std::size_t>(1, static_cast<std::size_t>(std::llround(patches)));
     return layout;
 }

@@ -453,14 +453,12 @@ private:
                 triangles.push_back(surface_.triangles[t]);
                 ids.push_back(t);
             }
-        context_.execute([&] {
-            const ClosestPointTree tree(cleaned_.positions, triangles);
-            parallel_for(context_, lost.size(), 256, [&](std::size_t begin, std::size_t end) {
-                for (std::size_t i = begin; i < end && !context_.is_cancelled(); ++i) {
-                    const SurfacePoint closest = tree.closest(result_.mesh.positions[lost[i]]);
-                    result_.source[lost[i]] = {corners[ids[closest.triangle]], closest.barycentric};
-                }
-            });
+        const ClosestPointTree tree(cleaned_.positions, triangles, context_);
+        parallel_for(context_, lost.size(), 256, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end && !context_.is_cancelled(); ++i) {
+                const SurfacePoint closest = tree.closest(result_.mesh.positions[lost[i]]);
+                result_.source[lost[i]] = {corners[ids[closest.triangle]], closest.barycentric};
+            }
         });
     }
 

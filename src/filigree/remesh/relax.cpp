@@ -1,5 +1,6 @@
 #include "filigree/remesh/relax.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/remesh/quad_quality.h"
 
@@ -134,7 +135,7 @@ public:
         for (const double step : {reach, 0.5 * reach, 0.2 * reach})
             for (int i = 0; i < kDirections; ++i) {
                 const double angle = 2 * std::numbers::pi * (i + 0.382 * round) / kDirections;
-                attempt(here + step * edge * (std::cos(angle) * x + std::sin(angle) * y));
+                attempt(here + step * edge * (math::cos(angle) * x + math::sin(angle) * y));
             }
         if (off_surface)
             for (const double step : {reach, 0.5 * reach, 0.2 * reach})
@@ -142,7 +143,7 @@ public:
                     attempt(here + sign * step * edge * normal);
                     const double angle = 2.4 * round; // the golden angle: every round looks elsewhere
                     attempt(here +
-                            sign * step * edge * (normal + std::cos(angle) * x + std::sin(angle) * y).normalized());
+                            sign * step * edge * (normal + math::cos(angle) * x + math::sin(angle) * y).normalized());
                 }
         if (moved) accept(v, found);
         return moved;

@@ -3,6 +3,7 @@
 // them.
 #include "filigree/remesh/surface_map.h"
 
+#include "filigree/core/math.h"
 #include "filigree/remesh/manifold_surface.h"
 #include <algorithm>
 #include <cmath>
@@ -115,7 +116,7 @@ std::size_t SurfaceMap::sector_size(Index half_edge) const {
 double SurfaceMap::corner_angle(Index half_edge) const {
     const Vec3d& p = positions_[from(half_edge)];
     const Vec3d a = positions_[to(half_edge)] - p, b = positions_[from(previous_half_edge(half_edge))] - p;
-    return std::atan2(a.cross(b).norm(), a.dot(b));
+    return math::atan2(a.cross(b).norm(), a.dot(b));
 }
 
 double SurfaceMap::sector_angle(Index half_edge) const {
@@ -173,11 +174,11 @@ bool SurfaceMap::flatten(Star& star) const {
     for (double& r : radii) r = std::max(r / longest, kSmallestRadius);
     for (std::size_t i = 0; i < n; ++i) {
         const Vec3d &a = arms[i], &b = arms[star.next(i)];
-        angles[i] = std::atan2(a.cross(b).norm(), a.dot(b));
+        angles[i] = math::atan2(a.cross(b).norm(), a.dot(b));
     }
     star.flat.resize(ring);
     const auto place = [&](std::size_t i, double angle) {
-        star.flat[i] = Vec2d(radii[i] * std::cos(angle), radii[i] * std::sin(angle)).cast<float>();
+        star.flat[i] = Vec2d(radii[i] * math::cos(angle), radii[i] * math::sin(angle)).cast<float>();
     };
     constexpr double pi = std::numbers::pi;
     if (kind_[star.centre] == VertexKind::inside) {

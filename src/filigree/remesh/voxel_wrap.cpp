@@ -395,8 +395,7 @@ std::vector<Vec3d> tangential_targets(std::span<const Vec3d> positions, std::spa
 
 void pull_onto_input(const PullTarget& input, const VoxelGrid& solid, std::span<const Triangle> triangles,
                      std::vector<Vec3d>& positions, const RunContext& context) {
-    std::optional<ClosestPointTree> tree; // Embree builds on the threads of the arena it is called in
-    context.execute([&] { tree.emplace(input.positions, input.triangles); });
+    const ClosestPointTree tree(input.positions, input.triangles, context);
     const IndexLists neighbours = find_neighbours(triangles, positions.size());
     for (int round = 0; round < kPullRounds && !context.is_cancelled(); ++round) {
         context.report("pulling the wrap onto the surface", double(round) / kPullRounds);
@@ -405,7 +404,7 @@ void pull_onto_input(const PullTarget& input, const VoxelGrid& solid, std::span<
             move_towards(tangential_targets(positions, normals, neighbours, context), triangles, positions, context);
             normals = unit_normals(positions, triangles);
         }
-        move_towards(pull_targets(*tree, solid, positions, normals, context), triangles, positions, context);
+        move_towards(pull_targets(tree, solid, positions, normals, context), triangles, positions, context);
     }
 }
 

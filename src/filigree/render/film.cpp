@@ -6,6 +6,7 @@
 #include "filigree/io/system/file_descriptor.h"
 #include "filigree/io/system/file_error.h"
 #include "filigree/io/system/numbered_name.h"
+#include "filigree/io/system/platform.h"
 #include "filigree/io/system/temporary_file.h"
 
 #include <algorithm>
@@ -81,7 +82,7 @@ public:
         if (fs::is_regular_file(existing)) fs::permissions(path_, existing.permissions(), failed); // best effort
         if (::rename(path_.c_str(), real_target_.c_str()) != 0) return errno;
         path_.clear();
-        sync_folder(real_target_.parent_path());
+        platform::flush_folder(real_target_.parent_path());
         return 0;
     }
 

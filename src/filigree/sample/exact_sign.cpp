@@ -5,6 +5,8 @@
 // where he has three: coordinates on a dyadic grid, which make most ties, are decided by the integers before it.
 #include "filigree/sample/exact_sign.h"
 
+#include "filigree/core/exact_arithmetic.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -53,29 +55,8 @@ struct Expansion {
     int sign() const { return count == 0 ? 0 : sign_of(terms[count - 1]); }
 };
 
-struct Pair {
-    double high, low; ///< high + low is exact, high is their rounded sum
-};
-
-Pair two_sum(double a, double b) {
-    const double sum = a + b;
-    const double b_part = sum - a, a_part = sum - b_part;
-    return {sum, (a - a_part) + (b - b_part)};
-}
-
-/// two_sum for |a| >= |b| or a == 0.
-Pair fast_two_sum(double a, double b) {
-    const double sum = a + b;
-    return {sum, b - (sum - a)};
-}
-
-Pair two_product(double a, double b) {
-    const double product = a * b;
-    return {product, std::fma(a, b, -product)};
-}
-
 Expansion<2> difference(double a, double b) {
-    const Pair d = two_sum(a, -b);
+    const ExactPair d = exact_sum(a, -b);
     Expansion<2> result;
     result.add(d.low);
     result.add(d.high);
@@ -94,7 +75,7 @@ Expansion<N + M> sum(const Expansion<N>& e, const Expansion<M>& f) {
     if (e.count + f.count == 0) return result;
     double carry = next();
     while (i + j < e.count + f.count) {
-        const Pair s = two_sum(carry, next());
+        const ExactPair s = exact_sum(carry, next());
         result.add(s.low);
         carry = s.high;
     }
@@ -107,10 +88,10 @@ Expansion<2 * N> product(const Expansion<N>& e, double factor) {
     Expansion<2 * N> result;
     double carry = 0;
     for (std::size_t i = 0; i < e.count; ++i) {
-        const Pair p = two_product(e.terms[i], factor);
-        const Pair low = two_sum(carry, p.low);
+        const ExactPair p = exact_product(e.terms[i], factor);
+        const ExactPair low = exact_sum(carry, p.low);
         result.add(low.low);
-        const Pair high = fast_two_sum(p.high, low.high);
+        const ExactPair high = exact_ordered_sum(p.high, low.high);
         result.add(high.low);
         carry = high.high;
     }

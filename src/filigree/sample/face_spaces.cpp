@@ -1,6 +1,7 @@
 #include "filigree/sample/face_spaces.h"
 
 #include "filigree/core/disjoint_sets.h"
+#include "filigree/core/math.h"
 #include "filigree/mesh/edges.h"
 
 #include <algorithm>
@@ -176,7 +177,7 @@ private:
             const Index before = 2 * patches_.of[h / 3], behind = before + 1;
             const Vec3d way = across(h);
             // Multiples of kSameAngle, so that faces on one another are at one angle; from 0 to below a full turn.
-            double angle = h == edge[0] ? 0 : std::round(std::atan2(way.dot(y), way.dot(x)) / kSameAngle);
+            double angle = h == edge[0] ? 0 : std::round(math::atan2(way.dot(y), way.dot(x)) / kSameAngle);
             if (angle < 0) angle += std::round(2 * std::numbers::pi / kSameAngle);
             // Of faces on one another the first patch lies lowest, as seen from one side of their plane at all edges.
             const Vec3d up = axis.cross(way);

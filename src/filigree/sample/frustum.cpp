@@ -1,5 +1,7 @@
 #include "filigree/sample/frustum.h"
 
+#include "filigree/core/math.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -28,7 +30,7 @@ Result<std::vector<Vec3d>> frustum_points(const Frustum& frustum) {
     if (count > double(1 << 28))
         return Error{ErrorCode::usage, "The frustum has more than 2^28 points; take fewer along its sides."};
     const Vec3d back = -forward.normalized(), right = across.normalized(), up = back.cross(right);
-    const double half = std::tan(frustum.field_of_view_deg * std::numbers::pi / 360);
+    const double half = math::tan(frustum.field_of_view_deg * std::numbers::pi / 360);
     const auto step = [](std::size_t i, std::size_t n) { return (2.0 * double(i) + 1) / double(n) - 1; };
     std::vector<Vec3d> points;
     points.reserve(static_cast<std::size_t>(count));

@@ -6,6 +6,7 @@
 // doubles with a bound on the error; what the bound leaves open is decided exactly.
 #include "filigree/sample/inside_rays.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/sample/wide_tree.h"
 #include "filigree/sample/wide_tree_lanes.h"
@@ -274,7 +275,7 @@ Result<RayParity> RayParity::create(std::span<const Vec3f> positions, std::span<
     if (eye)
         content->eye = *eye;
     else {
-        const double unit = std::exp2(std::ceil(std::log2(half_size > 0 ? half_size : 1)) - 8);
+        const double unit = math::exp2(std::ceil(math::log2(half_size > 0 ? half_size : 1)) - 8);
         const Vec3d wanted = content->centre + half_size * Vec3d(2.417, 3.731, 1.183);
         content->eye = (wanted / unit).array().round() * unit;
     }

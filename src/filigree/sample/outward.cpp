@@ -1,6 +1,7 @@
 #include "filigree/sample/outward.h"
 
 #include "filigree/core/disjoint_sets.h"
+#include "filigree/core/math.h"
 #include "filigree/core/text.h"
 #include "filigree/mesh/edges.h"
 #include "filigree/mesh/orientation.h"
@@ -218,7 +219,7 @@ private:
         middle /= all.area;
         for_each_unknown(
             [&](std::size_t, const Vec3d& a, const Vec3d& normal) { all.volume += normal.dot(a - middle); });
-        if (all.volume / 6 > -kLeastEnclosed * std::pow(all.area / 2, 1.5)) return;
+        if (all.volume / 6 > -kLeastEnclosed * math::pow(all.area / 2, 1.5)) return;
         for_each_unknown([&](std::size_t t, const Vec3d&, const Vec3d&) { flip(t); });
     }
 

@@ -1,5 +1,6 @@
 #include "filigree/sample.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/text.h"
 
 #include <algorithm>
@@ -26,7 +27,7 @@ double points_at(const Vec3d& size, double spacing) { return (size / spacing).cw
 double spacing_at(const Vec3d& size, double points) {
     Vec3d sides = size;
     std::sort(sides.begin(), sides.end(), std::greater<>());
-    if (const double spacing = std::cbrt(size.prod() / points); spacing <= sides[2]) return spacing;
+    if (const double spacing = math::cbrt(size.prod() / points); spacing <= sides[2]) return spacing;
     if (const double spacing = std::sqrt(sides[0] * sides[1] / points); spacing <= sides[1]) return spacing;
     return sides[0] / points;
 }
@@ -69,7 +70,7 @@ Result<double> spacing_for_count(const Mesh& mesh, std::size_t count, const Insi
         }
         if (inside == 0 || (is_hardly_inside && !is_fast && points <= kSearchedPoints))
             spacing /= 2;
-        else if (const double next = spacing * std::cbrt(inside / double(count));
+        else if (const double next = spacing * math::cbrt(inside / double(count));
                  std::max(spacing, next) <= size.minCoeff())
             spacing = next;
         else

@@ -2,6 +2,7 @@
 // first and second moments; [Van Oosterom 1983], the solid angle of a triangle.
 #include "filigree/sample/winding_tree.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/sample/exact_sign.h"
 #include "filigree/sample/wide_tree.h"
@@ -129,14 +130,14 @@ void set_child(Node& node, std::size_t c, const Moments& m, double beta) {
         node.centre[i][c] = static_cast<float>(m.centre[i]);
         node.dipole[i][c] = static_cast<float>(scale * m.dipole[i]);
     }
-    node.squared_reach[c] = static_cast<float>(std::pow(std::max(beta * m.radius, double{kNearest}), 2));
+    node.squared_reach[c] = static_cast<float>(math::pow(std::max(beta * m.radius, double{kNearest}), 2));
     for (std::size_t i = 0; i < 6; ++i) node.quadrupole[i][c] = static_cast<float>(scale * m.quadrupole[i]);
     for (std::size_t i = 0; i < 10; ++i) node.octupole[i][c] = static_cast<float>(scale * m.octupole[i]);
 }
 
 /// How many radii away a node's moments stand for it. Largest errors measured on the dragon with holes and turned
 /// triangles go down as beta^-4.35; with this they are about a third of `accuracy`.
-double beta_of(double accuracy) { return 1.2 * std::pow(0.1 / std::clamp(accuracy, 1e-4, 0.1), 0.24); }
+double beta_of(double accuracy) { return 1.2 * math::pow(0.1 / std::clamp(accuracy, 1e-4, 0.1), 0.24); }
 
 /// Empty when there is no triangle, or when cancelled.
 Tree make_tree(std::span<const Vec3f> positions, std::span<const Triangle> triangles, double accuracy,
@@ -233,7 +234,7 @@ double half_angle_in_plane(const Vec3d& a, const Vec3d& b, const Vec3d& c, const
     for (Vec3d& x : p) x -= kBeside * size * Vec3d(1, 1e-3, 1e-6);
     const double la = p[0].norm(), lb = p[1].norm(), lc = p[2].norm();
     const double along = la * lb * lc + p[0].dot(p[1]) * lc + p[1].dot(p[2]) * la + p[2].dot(p[0]) * lb;
-    return side * std::atan2(std::abs(p[0].dot(p[1].cross(p[2]))), along);
+    return side * math::atan2(std::abs(p[0].dot(p[1].cross(p[2]))), along);
 }
 
 /// Sum of half the solid angles. `nearest`: made less where a triangle's box is nearer.

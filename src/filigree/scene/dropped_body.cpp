@@ -1,5 +1,6 @@
 #include "filigree/scene/dropped_body.h"
 
+#include "filigree/core/math.h"
 #include "filigree/mesh.h"
 #include "filigree/physics/body/own_weight.h"
 #include "filigree/scene/particles_near.h"
@@ -95,7 +96,7 @@ private:
         const double length = kSlopeLength * size_, thickness = kSlopeThickness * size_;
         const double angle = kSlopeDegrees * std::numbers::pi / 180;
         // Turned about the middle of its upper side, so far down that a body as wide as its size clears its upper half.
-        const double below = 0.5 * size_ * std::tan(angle);
+        const double below = 0.5 * size_ * math::tan(angle);
         const Vec3d pivot = place(0, lowest_ - below);
         const Cuboid slope{pivot - 0.5 * thickness * at_.up, along_axes(length, thickness, kStepWidth * size_)};
         RigidMotion motion;
@@ -143,8 +144,8 @@ Status let_it_melt(const DropOptions& options, const BodyLook& look, DroppedBody
     World& world = dropped.world;
     world.air_temperature.constant = options.air_temperature;
     world.air_heat_transfer = kAirHeatTransfer;
-    const double volume = double(body.particle_count()) * std::pow(body.spacing(), 3);
-    const double area = std::cbrt(36 * std::numbers::pi * volume * volume); // of a ball of that volume
+    const double volume = double(body.particle_count()) * math::pow(body.spacing(), 3);
+    const double area = math::cbrt(36 * std::numbers::pi * volume * volume); // of a ball of that volume
     const double seconds =
         volume * body.material.density * heat_of_melting(body.material) / (kAirHeatTransfer * area * kWarmer);
     world.heat_pace = std::max(1.0, seconds / options.melting_time);

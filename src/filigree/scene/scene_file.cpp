@@ -1,5 +1,6 @@
 #include "filigree/scene.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/random.h"
 #include "filigree/file.h"
 #include "filigree/io/model/model_file.h"
@@ -43,7 +44,8 @@ SceneBody repeated(const SceneBody& body, const SceneRepeat& repeat, std::size_t
         one.aside[axis] = repeat.step[axis] * place[repeat.is_row ? 0 : axis] + repeat.jitter * at(unsigned(axis));
     const Vec3d about(at(3), at(4), at(5));
     if (repeat.turn > 0 && about.norm() > 0)
-        one.rotation = Eigen::AngleAxisd(repeat.turn * at(6), about.normalized()) * body.rotation;
+        one.rotation = math::angle_axis(math::quaternion({repeat.turn * at(6), about.normalized()}) *
+                                        math::quaternion(body.rotation));
     return one;
 }
 

@@ -1,5 +1,6 @@
 #include "filigree/scene/scene_run.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/now_seconds.h"
 #include "filigree/core/text.h"
 #include "filigree/melting/composite_surface.h"
@@ -51,7 +52,7 @@ void add_frame(CheckTotals& check, const Mesh& mesh, std::span<const Vec3f> rest
     std::vector<float> angles;
     for (std::size_t v = 0; v < ours.size(); ++v)
         if (is_old(v) && !ours[v].isZero() && !theirs[v].isZero())
-            angles.push_back(std::atan2(ours[v].cross(theirs[v]).norm(), ours[v].dot(theirs[v])) * 180 /
+            angles.push_back(math::atan2(ours[v].cross(theirs[v]).norm(), ours[v].dot(theirs[v])) * 180 /
                              std::numbers::pi_v<float>);
     const double p95 = percentile_95(angles),
                  rms = std::sqrt(squares / double(std::max<std::size_t>(old, 1))) / diagonal;

@@ -1,5 +1,6 @@
 #include "filigree/scene/world_setup.h"
 
+#include "filigree/core/math.h"
 #include "filigree/file.h"
 #include "filigree/fracture.h"
 #include "filigree/fracture/broken_model.h"
@@ -140,7 +141,8 @@ private:
         const Vec3d middle = body.scale * body_box(body).centre();
         Actor actor{.body = body.body, .velocity = from.velocity, .spin = from.spin, .may_sleep = from.may_sleep};
         const Vec3d centre = from.centre.value_or(middle + body.scale * body.origin) + from.aside;
-        actor.placement = Eigen::Translation3d(centre) * from.rotation * Eigen::Translation3d(-middle);
+        actor.placement.linear() = math::matrix(from.rotation);
+        actor.placement.translation() = centre - actor.placement.linear() * middle;
         if (!is_another) warn_of_weight(from, *body.body, actor.placement.linear());
         result_.actors.push_back(std::move(actor));
         result_.bodies.push_back(std::move(body));
@@ -199,7 +201,7 @@ private:
             box.extend(middle.array() + reach);
         }
         if (box.centre().norm() > kFar * box.diagonal()) {
-            const double step = std::exp2(std::ceil(std::log2(box.diagonal())));
+            const double step = math::exp2(std::ceil(math::log2(box.diagonal())));
             result_.origin = step * (box.centre() / step).array().round();
             for (Actor& actor : result_.actors) actor.placement.pretranslate(-result_.origin);
         }
@@ -386,7 +388,7 @@ private:
             hand.point = float(body.scale) * mesh.positions[*from.vertex];
         } else {
             const std::vector<Triangle> triangles = triangulate(mesh, context_).value().triangles;
-            const ClosestPointTree tree(mesh.positions, triangles);
+            const ClosestPointTree tree(mesh.positions, triangles, context_);
             const Vec3d at =
                 result_.actors[from.body].placement.inverse() * (*from.point - result_.origin) / body.scale;
             hand.point = float(body.scale) * tree.closest(at.cast<float>()).position;

@@ -5,32 +5,18 @@
 #include "filigree/io/system/file.h"
 #include "filigree/io/system/file_descriptor.h"
 #include "filigree/io/system/file_error.h"
+#include "filigree/io/system/platform.h"
 #include "filigree/io/system/shared_work.h"
 #include "filigree/io/system/temporary_file.h"
 
 #include <algorithm>
 #include <cerrno>
 
-#include <fcntl.h>
-#include <unistd.h>
-
 namespace filigree {
 
 namespace {
 
 namespace fs = std::filesystem;
-
-/// 0 or the error number.
-int write_at(int descriptor, std::uint64_t offset, std::string_view bytes) {
-    while (!bytes.empty()) {
-        const ssize_t written = ::pwrite(descriptor, bytes.data(), bytes.size(), off_t(offset));
-        if (written < 0 && errno == EINTR) continue;
-        if (written < 0) return errno;
-        bytes.remove_prefix(std::size_t(written));
-        offset += std::uint64_t(written);
-    }
-    return 0;
-}
 
 /// What the processes of one job share: the frames, and a mark for every chunk that is in them.
 class SharedFrames {
@@ -58,14 +44,14 @@ public:
         if (!folder_.is_ours()) return cannot_write(frames, ENOENT);
         if (Status made = folder_.add(kFrames, [&](const fs::path& empty) { return make_empty(empty); }); !made)
             return made;
-        const FileDescriptor file(::open(frames.c_str(), O_WRONLY | O_CLOEXEC));
+        const FileDescriptor file(platform::open_to_write(frames));
         if (!file.is_open()) return cannot_write(frames, errno);
         const auto write_some = [&](std::uint64_t offset, std::string_view bytes) -> Status {
-            if (const int wrong = write_at(file.get(), offset, bytes)) return cannot_write(frames, wrong);
+            if (const int wrong = platform::write_at(file.get(), offset, bytes)) return cannot_write(frames, wrong);
             return Success{};
         };
         if (Status filled = fill(write_some); !filled) return filled;
-        if (::fsync(file.get()) != 0) return cannot_write(frames, errno);
+        if (const int wrong = platform::flush(file.get())) return cannot_write(frames, wrong);
         return Success{};
     }
 
@@ -76,13 +62,14 @@ public:
         // It keeps its name in the folder: without it another process would begin an empty one there.
         const fs::path frames = folder_.file(kFrames), whole = temporary_path(folder_.file(""));
         if (!folder_.is_ours()) return cannot_write(frames, ENOENT);
-        const bool is_moved = ::link(frames.c_str(), whole.c_str()) == 0 && ::rename(whole.c_str(), path_.c_str()) == 0;
-        if (!is_moved) {
-            if (errno != ENOENT) return cannot_write(path_, errno);
+        int failed = platform::link(frames, whole);
+        if (failed == 0) failed = platform::rename(whole, path_);
+        if (failed != 0) {
+            if (failed != ENOENT) return cannot_write(path_, failed);
             if (!is_in_place()) // one that was killed had put it there, and somebody took it away
                 return cannot_write(path_, frames.string() + " is gone; delete its folder, and run all chunks again");
         }
-        sync_folder(path_.parent_path());
+        platform::flush_folder(path_.parent_path());
         return folder_.end();
     }
 
@@ -94,10 +81,10 @@ private:
         return fs::file_size(path_, failed) == size_ && !failed;
     }
     Status make_empty(const fs::path& path) const {
-        const FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-        int wrong = file.is_open() ? write_at(file.get(), 0, header_) : errno;
-        if (!wrong && ::ftruncate(file.get(), off_t(size_)) != 0) wrong = errno;
-        if (!wrong && ::fsync(file.get()) != 0) wrong = errno;
+        const FileDescriptor file(platform::create_new(path));
+        int wrong = file.is_open() ? platform::write_at(file.get(), 0, header_) : errno;
+        if (!wrong) wrong = platform::set_size(file.get(), size_);
+        if (!wrong) wrong = platform::flush(file.get());
         if (wrong) return cannot_write(path, wrong);
         return Success{};
     }

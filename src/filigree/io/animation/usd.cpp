@@ -3,14 +3,12 @@
 #include "filigree/io/animation/point_cache.h"
 #include "filigree/io/mesh/mesh_formats.h"
 #include "filigree/io/system/file.h"
-#include "filigree/io/system/temporary_file.h"
+#include "filigree/io/system/file_descriptor.h"
+#include "filigree/io/system/platform.h"
 #include "filigree/io/system/text_writer.h"
 #include "filigree/mesh/normals.h"
 
-#include <fstream>
 #include <memory>
-
-#include <unistd.h>
 
 namespace filigree {
 
@@ -222,42 +220,33 @@ private:
 /// Text that is made frame by frame and belongs behind other text: in a file that nobody else sees.
 class WaitingText {
 public:
-    explicit WaitingText(const std::filesystem::path& folder) {
-        std::filesystem::path path;
-        const int descriptor = create_beside(folder / "usd", path);
-        if (descriptor < 0) {
-            file_.setstate(std::ios::failbit); // status() tells of it
-            return;
-        }
-        file_.open(path, std::ios::in | std::ios::out | std::ios::trunc | std::ios::binary);
-        ::unlink(path.c_str()); // it goes when it is closed
-        ::close(descriptor);
-    }
+    explicit WaitingText(const std::filesystem::path& folder) : file_(platform::open_scratch(folder)) {}
 
-    UsdText text{[this](std::string_view bytes) {
-        file_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-        return status();
+    UsdText text{[this](std::string_view bytes) -> Status {
+        if (!file_.is_open() || platform::write_at(file_.get(), size_, bytes) != 0) return failure();
+        size_ += bytes.size();
+        return Success{};
     }};
 
     Status append_to(FileWriter& out) {
         if (Status written = text.finish(); !written) return written;
-        file_.flush();
-        file_.seekg(0);
         std::string piece(std::size_t{1} << 20, '\0');
-        while (file_.read(piece.data(), static_cast<std::streamsize>(piece.size())) || file_.gcount() > 0)
-            if (Status written = out.write({piece.data(), static_cast<std::size_t>(file_.gcount())}); !written)
-                return written;
-        file_.clear();
+        for (std::uint64_t at = 0; at < size_;) {
+            const std::int64_t got = platform::read_at(file_.get(), at, piece);
+            if (got <= 0) return failure();
+            if (Status written = out.write({piece.data(), static_cast<std::size_t>(got)}); !written) return written;
+            at += static_cast<std::uint64_t>(got);
+        }
         return Success{};
     }
 
 private:
-    Status status() const {
-        if (file_) return Success{};
-        return Error{ErrorCode::unwritable, "A temporary file beside the USD text cannot be written: is there room?"};
+    static Error failure() {
+        return {ErrorCode::unwritable, "A temporary file beside the USD text cannot be written: is there room?"};
     }
 
-    std::fstream file_;
+    FileDescriptor file_;
+    std::uint64_t size_ = 0;
 };
 
 /// The time samples of one attribute: declared when the first frame has it.

@@ -1,6 +1,7 @@
 #include "filigree/io/gltf/glb_skin_animation.h"
 
 #include "filigree/core/dense_solve.h"
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 
 #include <algorithm>
@@ -17,7 +18,7 @@ double normal_error(const Mat3d& gradient) {
     const Vec3d s = singular_values_only(gradient);
     if (!(s[2] > 0)) return 90;
     const double ratio = s[0] / s[2];
-    return (std::atan(ratio) - std::atan(1 / ratio)) * 180 / M_PI;
+    return (math::atan(ratio) - math::atan(1 / ratio)) * 180 / std::numbers::pi;
 }
 
 double percentile95(std::vector<float> values) {

@@ -1,5 +1,6 @@
 // Where a glTF scene's vertices are: keys, nodes, morph targets and skins, in double.
 #include "filigree/core/dense_solve.h"
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/io/gltf/gltf_scene.h"
 
@@ -72,7 +73,7 @@ private:
     void interpolate_rotation(double fraction) {
         const Eigen::Quaterniond a = Eigen::Quaterniond(values_.data()).normalized();
         const Eigen::Quaterniond b = Eigen::Quaterniond(next_.data()).normalized();
-        Eigen::Map<Eigen::Quaterniond>(values_.data()) = a.slerp(fraction, b); // the short way
+        Eigen::Map<Eigen::Quaterniond>(values_.data()) = math::slerp(a, fraction, b);
     }
 
     std::vector<double> values_, next_, leaving_, arriving_;

@@ -1,4 +1,5 @@
 // The vertices of a glTF primitive: attributes, influences of joints, morph targets.
+#include "filigree/core/math.h"
 #include "filigree/core/srgb.h"
 #include "filigree/io/gltf/gltf_scene.h"
 #include "filigree/io/mesh/mesh_formats.h"
@@ -309,7 +310,7 @@ Unflagged mend_unflagged(std::span<Accessor* const> accessors) {
 
 Vec2f UvUse::apply(const Vec2f& uv) const {
     if (*this == UvUse{.set = set}) return {uv.x(), 1 - uv.y()};
-    const double x = scale[0] * uv.x(), y = scale[1] * uv.y(), c = std::cos(rotation), s = std::sin(rotation);
+    const double x = scale[0] * uv.x(), y = scale[1] * uv.y(), c = math::cos(rotation), s = math::sin(rotation);
     return {static_cast<float>(offset[0] + c * x + s * y), static_cast<float>(1 - (offset[1] - s * x + c * y))};
 }
 

@@ -2,28 +2,25 @@
 #include "filigree/core/large_memory.h"
 #include "filigree/io/system/file_descriptor.h"
 #include "filigree/io/system/file_error.h"
+#include "filigree/io/system/platform.h"
 #include "filigree/io/system/temporary_file.h"
 
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <new>
 #include <optional>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 namespace filigree {
 
 namespace {
 
 namespace fs = std::filesystem;
+using Kind = platform::Status::Kind;
 
 /// What `read` gives, or that there is no room for it.
 template <class Read>
@@ -37,20 +34,11 @@ Result<std::string> in_memory(const fs::path& path, const Read& read) {
     }
 }
 
-/// Bytes of memory that there are for this program: the machine's, or fewer where its container has a limit.
-std::uint64_t memory_here() {
-    const long pages = ::sysconf(_SC_PHYS_PAGES), page = ::sysconf(_SC_PAGESIZE);
-    std::uint64_t memory = pages > 0 && page > 0 ? std::uint64_t(pages) * std::uint64_t(page) : UINT64_MAX;
-    std::ifstream limit("/sys/fs/cgroup/memory.max"); // "max" where there is none
-    if (std::uint64_t bytes = 0; limit >> bytes) memory = std::min(memory, bytes);
-    return memory;
-}
-
 /// Refuses a file whose bytes cannot all be here, before any of them is read: where memory is promised freely, the
 /// program would be killed in the midst of it.
 Status check_room(const fs::path& path, std::uint64_t bytes) {
     constexpr double kGigabyte = 1e9;
-    const std::uint64_t memory = memory_here();
+    const std::uint64_t memory = platform::memory();
     if (bytes <= memory) return Success{};
     char sizes[96];
     std::snprintf(sizes, sizeof sizes, "has %.3g GB, and there are %.3g GB of memory", double(bytes) / kGigabyte,
@@ -60,15 +48,16 @@ Status check_room(const fs::path& path, std::uint64_t bytes) {
 
 Result<std::string> read_descriptor(int descriptor, const fs::path& path) {
     constexpr std::size_t kPipePiece = std::size_t{1} << 16;
-    struct stat status {};
-    if (::fstat(descriptor, &status) != 0) return cannot_read(path, errno);
-    if (S_ISDIR(status.st_mode)) return cannot_read(path, EISDIR);
+    const std::optional<platform::Status> status = platform::status_of(descriptor);
+    if (!status) return cannot_read(path, errno);
+    if (status->kind == Kind::folder) return cannot_read(path, EISDIR);
     // The size is a hint: pipes have none, and files grow and shrink. One byte more finds the end without another
     // round.
-    if (S_ISREG(status.st_mode))
-        if (Status fits = check_room(path, static_cast<std::uint64_t>(status.st_size)); !fits) return fits.error();
+    const bool has_size = status->kind == Kind::file;
+    if (has_size)
+        if (Status fits = check_room(path, status->size); !fits) return fits.error();
     std::string bytes;
-    const std::size_t first_size = S_ISREG(status.st_mode) ? static_cast<std::size_t>(status.st_size) + 1 : kPipePiece;
+    const std::size_t first_size = has_size ? static_cast<std::size_t>(status->size) + 1 : kPipePiece;
     reserve_large(bytes, first_size);
     bytes.resize(first_size);
     for (std::size_t used = 0;;) {
@@ -76,8 +65,7 @@ Result<std::string> read_descriptor(int descriptor, const fs::path& path) {
             if (Status fits = check_room(path, used); !fits) return fits.error();
             bytes.resize(2 * bytes.size());
         }
-        const ssize_t got = ::read(descriptor, bytes.data() + used, bytes.size() - used);
-        if (got < 0 && errno == EINTR) continue;
+        const std::int64_t got = platform::read(descriptor, std::span(bytes).subspan(used));
         if (got < 0) return cannot_read(path, errno);
         used += static_cast<std::size_t>(got);
         if (got == 0) {
@@ -91,32 +79,11 @@ Result<std::string> read_whole(int descriptor, const fs::path& path) {
     return in_memory(path, [&] { return read_descriptor(descriptor, path); });
 }
 
-/// 0 or the error number.
-int write_piece(int descriptor, std::string_view piece) {
-    while (!piece.empty()) {
-        const ssize_t written = ::write(descriptor, piece.data(), piece.size());
-        if (written < 0 && errno == EINTR) continue;
-        if (written < 0) return errno;
-        piece.remove_prefix(static_cast<std::size_t>(written));
-    }
-    return 0;
-}
-
-/// A file without a name in a folder, which goes with its last descriptor, also when the process is killed; -1 where
-/// the file system has none, or one could not be given a name later.
-int open_unnamed(const fs::path& folder) {
-    const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
-    if (descriptor < 0 || ::access(("/proc/self/fd/" + std::to_string(descriptor)).c_str(), F_OK) == 0)
-        return descriptor;
-    ::close(descriptor);
-    return -1;
-}
-
 } // namespace
 
 Result<std::string> read_file(const fs::path& path) {
-    if (path == "-") return read_whole(STDIN_FILENO, "standard input");
-    const FileDescriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+    if (path == "-") return read_whole(platform::kStandardInput, "standard input");
+    const FileDescriptor descriptor(platform::open_to_read(path));
     if (!descriptor.is_open()) return cannot_read(path, errno);
     return read_whole(descriptor.get(), path);
 }
@@ -144,15 +111,15 @@ FileReader::FileReader(std::string_view beginning, std::uint64_t size) : file_(s
 Result<FileReader> FileReader::open(const fs::path& path) {
     auto file = std::make_unique<OpenFile>();
     file->path = path;
-    struct stat status {};
     if (path != "-") {
-        file->descriptor = FileDescriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-        if (!file->descriptor.is_open() || ::fstat(file->descriptor.get(), &status) != 0)
-            return cannot_read(path, errno);
-        file->size = static_cast<std::uint64_t>(status.st_size);
-        if (S_ISREG(status.st_mode) && file->size > 0) return FileReader(std::move(file));
+        file->descriptor = FileDescriptor(platform::open_to_read(path));
+        if (!file->descriptor.is_open()) return cannot_read(path, errno);
+        const std::optional<platform::Status> status = platform::status_of(file->descriptor.get());
+        if (!status) return cannot_read(path, errno);
+        file->size = status->size;
+        if (status->kind == Kind::file && file->size > 0) return FileReader(std::move(file));
     }
-    Result<std::string> bytes = read_whole(path == "-" ? STDIN_FILENO : file->descriptor.get(),
+    Result<std::string> bytes = read_whole(path == "-" ? platform::kStandardInput : file->descriptor.get(),
                                            path == "-" ? fs::path("standard input") : path);
     if (!bytes) return bytes.error();
     file->descriptor.close();
@@ -176,8 +143,7 @@ Status FileReader::read(std::uint64_t offset, std::span<char> to) const {
         return Success{};
     }
     while (!to.empty()) {
-        const ssize_t got = ::pread(file.descriptor.get(), to.data(), to.size(), static_cast<off_t>(offset));
-        if (got < 0 && errno == EINTR) continue;
+        const std::int64_t got = platform::read_at(file.descriptor.get(), offset, to);
         if (got < 0) return cannot_read(file.path, errno);
         if (got == 0) return is_shorter();
         to = to.subspan(static_cast<std::size_t>(got));
@@ -204,31 +170,33 @@ struct FileWriter::OpenFile {
     bool is_unnamed = false;
     FileDescriptor descriptor;
     bool is_standard_output = false;
-    std::optional<mode_t> permissions; ///< of the file that is replaced
+    std::optional<unsigned> permissions; ///< of the file that is replaced
 
-    int get() const { return is_standard_output ? STDOUT_FILENO : descriptor.get(); }
+    int get() const { return is_standard_output ? platform::kStandardOutput : descriptor.get(); }
     ~OpenFile() {
         descriptor.close();
-        if (!temporary.empty()) ::unlink(temporary.c_str());
+        if (!temporary.empty()) platform::remove_file(temporary);
     }
 
     /// 0 or the error number.
     int finish() {
         const bool replaces = is_unnamed || !temporary.empty();
-        if (permissions && ::fchmod(descriptor.get(), *permissions) != 0) return errno;
-        if (replaces && ::fsync(descriptor.get()) != 0) return errno;
+        if (permissions)
+            if (const int failed = platform::set_permissions(descriptor.get(), *permissions)) return failed;
+        if (replaces)
+            if (const int failed = platform::flush(descriptor.get())) return failed;
         if (is_unnamed) {
             fs::path name;
             if (const int failed = name_beside(target, descriptor.get(), name)) return failed;
             temporary = name;
         }
         // Another descriptor keeps the lock until the name is gone; what closing tells has to be known before.
-        const FileDescriptor lock(::fcntl(descriptor.get(), F_DUPFD_CLOEXEC, 0));
+        const FileDescriptor lock(platform::duplicate(descriptor.get()));
         if (!descriptor.close()) return errno;
         if (!replaces) return 0;
-        if (::rename(temporary.c_str(), target.c_str()) != 0) return errno;
+        if (const int failed = platform::rename(temporary, target)) return failed;
         temporary.clear();
-        sync_folder(target.parent_path());
+        platform::flush_folder(target.parent_path());
         return 0;
     }
 };
@@ -249,16 +217,16 @@ Result<FileWriter> FileWriter::create(const fs::path& path) {
     const fs::path target = file->target = follow_links(path);
     std::error_code ignored;
     if (fs::is_symlink(target, ignored)) return cannot_write(path, ELOOP);
-    struct stat existing {};
-    const bool exists = ::stat(target.c_str(), &existing) == 0;
-    if (exists && S_ISDIR(existing.st_mode)) return cannot_write(path, EISDIR);
-    if (exists && !S_ISREG(existing.st_mode)) { // a device or pipe stays what it is
-        file->descriptor = FileDescriptor(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+    const std::optional<platform::Status> existing = platform::status_of(target);
+    if (existing && existing->kind == Kind::folder) return cannot_write(path, EISDIR);
+    if (existing && existing->kind != Kind::file) { // a device or pipe stays what it is
+        file->descriptor = FileDescriptor(platform::open_to_write(path));
     } else {
-        if (exists && ::access(target.c_str(), W_OK) != 0) return cannot_write(path, errno); // read-only: hands off
+        if (existing) // read-only: hands off
+            if (const int refused = platform::refused_writing(target)) return cannot_write(path, refused);
         if (!target.has_filename()) return cannot_write(path, ENOENT);
-        if (exists) file->permissions = existing.st_mode & 07777;
-        file->descriptor = FileDescriptor(open_unnamed(target.parent_path()));
+        if (existing) file->permissions = existing->permissions;
+        file->descriptor = FileDescriptor(platform::open_unnamed(target.parent_path()));
         file->is_unnamed = file->descriptor.is_open();
         fs::path temporary;
         if (!file->is_unnamed) file->descriptor = FileDescriptor(create_beside(target, temporary));
@@ -269,24 +237,17 @@ Result<FileWriter> FileWriter::create(const fs::path& path) {
 }
 
 Status FileWriter::write(std::string_view bytes) {
-    if (const int failed = write_piece(file_->get(), bytes)) return cannot_write(file_->path, failed);
+    if (const int failed = platform::write(file_->get(), bytes)) return cannot_write(file_->path, failed);
     return Success{};
 }
 
 Status FileWriter::reserve(std::uint64_t bytes) {
-    const bool has_room = ::fallocate(file_->get(), 0, 0, static_cast<off_t>(bytes)) == 0;
-    if (!has_room && (errno == ENOSPC || errno == EFBIG || errno == EDQUOT)) return cannot_write(file_->path, errno);
+    if (const int failed = platform::reserve(file_->get(), bytes)) return cannot_write(file_->path, failed);
     return Success{};
 }
 
 Status FileWriter::write_at(std::uint64_t offset, std::string_view bytes) {
-    while (!bytes.empty()) {
-        const ssize_t written = ::pwrite(file_->get(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
-        if (written < 0 && errno == EINTR) continue;
-        if (written < 0) return cannot_write(file_->path, errno);
-        bytes.remove_prefix(static_cast<std::size_t>(written));
-        offset += static_cast<std::uint64_t>(written);
-    }
+    if (const int failed = platform::write_at(file_->get(), offset, bytes)) return cannot_write(file_->path, failed);
     return Success{};
 }
 

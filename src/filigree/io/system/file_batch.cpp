@@ -3,6 +3,7 @@
 #include "filigree/io/system/file.h"
 #include "filigree/io/system/file_descriptor.h"
 #include "filigree/io/system/file_error.h"
+#include "filigree/io/system/platform.h"
 #include "filigree/io/system/temporary_file.h"
 
 #include <algorithm>
@@ -12,16 +13,12 @@
 #include <optional>
 #include <string_view>
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 namespace filigree {
 
 namespace {
 
 namespace fs = std::filesystem;
+using Kind = platform::Status::Kind;
 
 // What a batch's folder holds.
 constexpr const char* kNew = "new";       // files for their places, under their names
@@ -50,15 +47,14 @@ std::vector<std::string> names_in(const fs::path& folder) {
 /// A lock that goes with the process.
 class Lock {
 public:
-    /// flags: for open.
-    Lock(const fs::path& file, int flags) : descriptor_(::open(file.c_str(), O_RDWR | O_CLOEXEC | flags, 0600)) {
+    /// make: a new file, else one that is there.
+    Lock(const fs::path& file, bool make) : descriptor_(platform::open_lock_file(file, make)) {
         if (!descriptor_.is_open()) return;
-        struct stat status {};
-        const bool is_locked = ::flock(descriptor_.get(), LOCK_EX | LOCK_NB) == 0;
-        is_lost_ = !is_locked && errno == EWOULDBLOCK;
-        if (::fstat(descriptor_.get(), &status) == 0 && status.st_nlink == 0)
-            is_lost_ = true; // removed before we had it
-        is_held_ = is_locked && !is_lost_;
+        const platform::Locked locked = platform::lock(descriptor_.get());
+        const std::optional<platform::Status> status = platform::status_of(descriptor_.get());
+        const bool is_removed = status && status->names == 0; // before we had it
+        is_lost_ = locked == platform::Locked::by_another || is_removed;
+        is_held_ = locked == platform::Locked::yes && !is_lost_;
     }
     bool is_there() const { return descriptor_.is_open(); }
     bool is_held() const { return is_held_; }
@@ -76,14 +72,8 @@ struct Stamp {
     bool operator==(const Stamp&) const = default;
 };
 
-std::optional<struct stat> status_of(const fs::path& path) {
-    struct stat status {};
-    if (::lstat(path.c_str(), &status) != 0) return {};
-    return status;
-}
-
-Stamp stamp_of(const struct stat& status) {
-    return {status.st_mtim.tv_sec, status.st_mtim.tv_nsec, static_cast<long long>(status.st_size)};
+Stamp stamp_of(const platform::Status& status) {
+    return {status.seconds, status.nanoseconds, static_cast<long long>(status.size)};
 }
 
 /// Stamps by name as a file's bytes: "seconds nanoseconds size name", each with a zero behind it, as names may hold
@@ -114,13 +104,13 @@ Stamps read_stamps(const fs::path& file) {
 
 /// Whether a file can be put there. What a link leads to would not be replaced, so links are refused.
 Status check_target(const fs::path& target) {
-    const std::optional<struct stat> status = status_of(target);
+    const std::optional<platform::Status> status = platform::status_of_name(target);
     if (!status) return Success{};
-    if (S_ISDIR(status->st_mode)) return cannot_write(target, "it is a folder");
-    if (S_ISLNK(status->st_mode))
+    if (status->kind == Kind::folder) return cannot_write(target, "it is a folder");
+    if (status->kind == Kind::link)
         return cannot_write(target, "it is a symbolic link; remove it, or choose another name");
-    if (!S_ISREG(status->st_mode)) return cannot_write(target, "it is a pipe or a device");
-    if (::access(target.c_str(), W_OK) != 0) return cannot_write(target, "permission is denied");
+    if (status->kind != Kind::file) return cannot_write(target, "it is a pipe or a device");
+    if (platform::refused_writing(target) != 0) return cannot_write(target, "permission is denied");
     return Success{};
 }
 
@@ -129,8 +119,8 @@ Error cannot_replace(const fs::path& target, int error_number) {
 }
 
 void keep_permissions(const fs::path& file, const fs::path& target) {
-    if (const auto status = status_of(target))
-        ::chmod(file.c_str(), status->st_mode & 07777); // best effort, as for some mounts
+    if (const auto status = platform::status_of_name(target))
+        platform::set_permissions(file, status->permissions); // best effort, as for some mounts
 }
 
 /// Moves the files that a killed batch had still to place, unless something newer is there.
@@ -138,13 +128,13 @@ Status place_rest(const fs::path& batch, const fs::path& folder) {
     const Stamps before = read_stamps(batch / kBefore);
     for (const std::string& name : names_in(batch / kNew)) {
         const fs::path file = batch / kNew / name, target = folder / name;
-        if (const auto status = status_of(target)) {
+        if (const auto status = platform::status_of_name(target)) {
             const auto known = before.find(name);
-            if (!S_ISREG(status->st_mode) || known == before.end() || known->second != stamp_of(*status)) continue;
+            if (status->kind != Kind::file || known == before.end() || known->second != stamp_of(*status)) continue;
         }
         keep_permissions(file, target);
-        if (::rename(file.c_str(), target.c_str()) != 0)
-            return Error{ErrorCode::unwritable, target.string() + ": cannot be put in place: " + cause_of(errno) +
+        if (const int failed = platform::rename(file, target))
+            return Error{ErrorCode::unwritable, target.string() + ": cannot be put in place: " + cause_of(failed) +
                                                     "; an earlier writing was interrupted, and its files are in " +
                                                     (batch / kNew).string() + "."};
     }
@@ -181,11 +171,11 @@ public:
         constexpr int kTries = 8; // another process may clear a folder away before it is locked
         for (int i = 0; i < kTries; ++i) {
             path_ = temporary_path(target_, kMaking);
-            if (::mkdir(path_.c_str(), 0777) != 0) return std::exchange(path_, {}), errno;
-            lock_.emplace(path_ / kLock, O_CREAT | O_EXCL);
+            if (const int failed = platform::make_folder(path_)) return std::exchange(path_, {}), failed;
+            lock_.emplace(path_ / kLock, true);
             if (lock_->is_lost() || !lock_->is_there()) continue;
-            if (::mkdir((path_ / kNew).c_str(), 0777) == 0 && ::mkdir((path_ / kOld).c_str(), 0777) == 0) return 0;
-            return errno;
+            if (const int failed = platform::make_folder(path_ / kNew)) return failed;
+            return platform::make_folder(path_ / kOld);
         }
         return EIO;
     }
@@ -202,7 +192,7 @@ public:
             take_back();
             return placed;
         }
-        sync_folder(target_);
+        platform::flush_folder(target_);
         return Success{};
     }
 
@@ -220,10 +210,10 @@ private:
         Stamps before;
         for (const std::string& name : names) {
             if (Status free = check_target(target_ / name); !free) return free;
-            if (const auto status = status_of(target_ / name)) before[name] = stamp_of(*status);
+            if (const auto status = platform::status_of_name(target_ / name)) before[name] = stamp_of(*status);
         }
         if (Status written = write_file(path_ / kBefore, stamp_bytes(before)); !written) return written;
-        sync_folder(path_ / kNew);
+        platform::flush_folder(path_ / kNew);
         return rename_to(kPlacing);
     }
 
@@ -231,24 +221,24 @@ private:
     Status rename_to(std::string_view state) {
         const std::string name = path_.filename().string();
         const fs::path renamed = target_ / name.substr(0, name.rfind('-')).append(state);
-        if (::rename(path_.c_str(), renamed.c_str()) != 0) return cannot_write(target_, errno);
+        if (const int failed = platform::rename(path_, renamed)) return cannot_write(target_, failed);
         path_ = renamed;
-        sync_folder(target_);
+        platform::flush_folder(target_);
         return Success{};
     }
 
     Status place(const std::string& name) {
         const fs::path place = target_ / name, before = path_ / kOld / name;
         if (Status free = check_target(place); !free) return free;
-        const bool replaces = status_of(place).has_value();
+        const bool replaces = platform::status_of_name(place).has_value();
         if (replaces) {
             keep_permissions(file(name), place);
-            if (::link(place.c_str(), before.c_str()) != 0 && // so that the place is never empty
-                ::rename(place.c_str(), before.c_str()) != 0) // without hard links
-                return cannot_replace(place, errno);
+            if (platform::link(place, before) != 0) // so that the place is never empty
+                if (const int failed = platform::rename(place, before))
+                    return cannot_replace(place, failed); // no links
         }
         placed_.push_back({name, replaces});
-        if (::rename(file(name).c_str(), place.c_str()) != 0) return cannot_replace(place, errno);
+        if (const int failed = platform::rename(file(name), place)) return cannot_replace(place, failed);
         return Success{};
     }
 
@@ -256,8 +246,8 @@ private:
     void take_back() {
         for (auto it = placed_.rbegin(); it != placed_.rend(); ++it) {
             const fs::path place = target_ / it->name;
-            if (!status_of(file(it->name))) ::rename(place.c_str(), file(it->name).c_str());
-            if (it->replaced) ::rename((path_ / kOld / it->name).c_str(), place.c_str());
+            if (!platform::status_of_name(file(it->name))) platform::rename(place, file(it->name));
+            if (it->replaced) platform::rename(path_ / kOld / it->name, place);
         }
         placed_.clear();
         (void)rename_to(kMaking);
@@ -286,10 +276,10 @@ Status complete_batches(const fs::path& folder) {
         const bool placing = is_batch(name, kPlacing);
         if (!placing && !is_batch(name, kMaking)) continue;
         const fs::path batch = folder / name;
-        const auto status = status_of(batch);
-        if (!status || !S_ISDIR(status->st_mode) || status->st_uid != ::geteuid()) continue;
-        const Lock lock(batch / kLock, O_NOFOLLOW);
-        if (!lock.is_there()) ::rmdir(batch.c_str()); // all but the empty folder was removed
+        const auto status = platform::status_of_name(batch);
+        if (!status || status->kind != Kind::folder || !status->is_own) continue;
+        const Lock lock(batch / kLock, false);
+        if (!lock.is_there()) platform::remove_empty_folder(batch); // all but the empty folder was removed
         if (!lock.is_held()) continue;
         if (placing)
             if (Status placed = place_rest(batch, folder); !placed) return placed;

@@ -1,9 +1,9 @@
 // An open file of the operating system.
 #pragma once
 
-#include <utility>
+#include "filigree/io/system/platform.h"
 
-#include <unistd.h>
+#include <utility>
 
 namespace filigree {
 
@@ -21,7 +21,7 @@ public:
     bool is_open() const { return descriptor_ >= 0; }
     int get() const { return descriptor_; }
     /// False: what was written may be lost, as errno says.
-    bool close() { return !is_open() || ::close(std::exchange(descriptor_, -1)) == 0; }
+    bool close() { return !is_open() || platform::close(std::exchange(descriptor_, -1)); }
 
 private:
     int descriptor_;

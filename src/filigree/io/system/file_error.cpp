@@ -19,8 +19,10 @@ std::string cause_of(int error_number) {
         return "the file system is read-only";
     case ENOSPC:
         return "the disk is full; make room or write elsewhere";
+#if defined(EDQUOT)
     case EDQUOT:
         return "the disk quota is used up; make room or write elsewhere";
+#endif
     case EFBIG:
         return "the file is larger than allowed here";
     case ENAMETOOLONG:

@@ -2,14 +2,12 @@
 
 #include "filigree/io/system/file.h"
 #include "filigree/io/system/file_error.h"
+#include "filigree/io/system/platform.h"
 #include "filigree/io/system/temporary_file.h"
 
 #include <algorithm>
 #include <cerrno>
 #include <unordered_set>
-
-#include <sys/stat.h>
-#include <unistd.h>
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -70,10 +68,10 @@ Result<bool> SharedFolder::begin() const {
         clear();
         return true;
     }
-    const bool is_new = ::mkdir(folder_.c_str(), 0777) == 0;
-    if (!is_new && errno != EEXIST) return cannot_write(folder_, errno);
+    const int made = platform::make_folder(folder_);
+    if (made != 0 && made != EEXIST) return cannot_write(folder_, made);
     if (is_finished()) { // by others, since we asked
-        if (is_new) ::rmdir(folder_.c_str());
+        if (made == 0) platform::remove_empty_folder(folder_);
         return true;
     }
     const Status planned = add(kPlanName, [&](const fs::path& plan) { return write_file(plan, plan_); });
@@ -87,22 +85,23 @@ Result<bool> SharedFolder::begin() const {
 }
 
 Status SharedFolder::add(const std::string& name, const std::function<Status(const fs::path& file)>& make) const {
-    std::error_code failed;
-    if (fs::exists(file(name), failed)) return Success{};
+    std::error_code ignored;
+    if (fs::exists(file(name), ignored)) return Success{};
     const fs::path temporary = temporary_path(folder_);
     Status made = make(temporary);
     // Whoever comes second finds the first one's.
-    if (made && ::link(temporary.c_str(), file(name).c_str()) != 0 && errno != EEXIST)
-        made = cannot_write(file(name), errno);
-    ::unlink(temporary.c_str());
+    if (made)
+        if (const int failed = platform::link(temporary, file(name)); failed != 0 && failed != EEXIST)
+            made = cannot_write(file(name), failed);
+    platform::remove_file(temporary);
     return made;
 }
 
 Status SharedFolder::mark(const std::string& name) const {
     if (!is_ours()) return cannot_write(file(name), ENOENT);
-    if (::link(file(kPlanName).c_str(), file(name).c_str()) != 0 && errno != EEXIST)
-        return cannot_write(file(name), errno);
-    sync_folder(folder_);
+    if (const int failed = platform::link(file(kPlanName), file(name)); failed != 0 && failed != EEXIST)
+        return cannot_write(file(name), failed);
+    platform::flush_folder(folder_);
     return Success{};
 }
 
@@ -124,14 +123,15 @@ Status SharedFolder::end() const {
     if (!has_plan(finished_)) {
         const fs::path plan =
             temporary_path(folder_); // there, so that a kill leaves no file of ours under another name
-        const bool is_moved =
-            ::link(file(kPlanName).c_str(), plan.c_str()) == 0 && ::rename(plan.c_str(), finished_.c_str()) == 0;
-        if (!is_moved && errno != ENOENT) return cannot_write(finished_, errno);
+        int failed = platform::link(file(kPlanName), plan);
+        if (failed == 0) failed = platform::rename(plan, finished_);
+        if (failed != 0 && failed != ENOENT) return cannot_write(finished_, failed);
     }
     // Renamed first, so that nobody takes half of it for parts that are missing.
-    if (::rename(folder_.c_str(), aside_.c_str()) != 0 && errno != ENOENT) return cannot_write(folder_, errno);
+    if (const int failed = platform::rename(folder_, aside_); failed != 0 && failed != ENOENT)
+        return cannot_write(folder_, failed);
     clear(); // what is left hinders nobody
-    sync_folder(path_.parent_path());
+    platform::flush_folder(path_.parent_path());
     return Success{};
 }
 

@@ -1,29 +1,19 @@
 #include "filigree/io/system/temporary_file.h"
 
+#include "filigree/core/hash.h"
+#include "filigree/io/system/file_descriptor.h"
+#include "filigree/io/system/platform.h"
+
 #include <cerrno>
 #include <functional>
-#include <random>
 #include <string>
 #include <system_error>
-
-#include <fcntl.h>
-#include <sys/file.h>
-#include <sys/random.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 namespace filigree {
 
 namespace {
 
 namespace fs = std::filesystem;
-
-std::uint64_t random_bits() {
-    std::uint64_t bits = 0;
-    if (::getrandom(&bits, sizeof bits, 0) == ssize_t{sizeof bits}) return bits;
-    std::random_device device; // on kernels without the call
-    return std::uint64_t{device()} << 32 | device();
-}
 
 fs::path path_of_bits(const fs::path& folder, std::uint64_t bits, std::string_view suffix) {
     constexpr char kDigits[] = "0123456789abcdef";
@@ -34,15 +24,13 @@ fs::path path_of_bits(const fs::path& folder, std::uint64_t bits, std::string_vi
 
 /// Removes a file of this user's that nobody has locked. While the lock is ours nobody else takes the name away.
 void remove_if_left(const fs::path& file) {
-    const int descriptor = ::open(file.c_str(), O_WRONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-    if (descriptor < 0) return;
-    struct stat here {};
-    struct stat named {};
-    if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0 && ::fstat(descriptor, &here) == 0 && S_ISREG(here.st_mode) &&
-        here.st_uid == ::geteuid() && ::lstat(file.c_str(), &named) == 0 && here.st_dev == named.st_dev &&
-        here.st_ino == named.st_ino)
-        ::unlink(file.c_str());
-    ::close(descriptor);
+    const FileDescriptor left(platform::open_lock_file(file, false));
+    if (!left.is_open() || platform::lock(left.get()) != platform::Locked::yes) return;
+    const std::optional<platform::Status> here = platform::status_of(left.get()),
+                                          named = platform::status_of_name(file);
+    if (here && named && here->kind == platform::Status::Kind::file && here->is_own && here->device == named->device &&
+        here->number == named->number)
+        platform::remove_file(file);
 }
 
 /// make: 0, or the error number; EEXIST where another name is to be tried.
@@ -59,7 +47,7 @@ int make_beside(const fs::path& target, const std::function<int(const fs::path&)
 } // namespace
 
 fs::path temporary_path(const fs::path& folder, std::string_view suffix) {
-    return path_of_bits(folder, random_bits(), suffix);
+    return path_of_bits(folder, platform::random_bits(), suffix);
 }
 
 int create_beside(const fs::path& target, fs::path& name) {
@@ -67,12 +55,12 @@ int create_beside(const fs::path& target, fs::path& name) {
     const int failed = make_beside(
         target,
         [&](const fs::path& file) {
-            descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+            descriptor = platform::create_new(file);
             if (descriptor < 0) return errno;
-            struct stat status {};
-            ::flock(descriptor, LOCK_EX | LOCK_NB);
-            if (::fstat(descriptor, &status) != 0 || status.st_nlink > 0) return 0;
-            ::close(descriptor); // removed before it was locked
+            platform::lock(descriptor);
+            const std::optional<platform::Status> status = platform::status_of(descriptor);
+            if (!status || status->names > 0) return 0;
+            platform::close(descriptor); // removed before it was locked
             return EEXIST;
         },
         name);
@@ -80,12 +68,9 @@ int create_beside(const fs::path& target, fs::path& name) {
 }
 
 int name_beside(const fs::path& target, int descriptor, fs::path& name) {
-    ::flock(descriptor, LOCK_EX | LOCK_NB);
-    const std::string unnamed = "/proc/self/fd/" + std::to_string(descriptor);
-    const auto link = [&](const fs::path& file) {
-        return ::linkat(AT_FDCWD, unnamed.c_str(), AT_FDCWD, file.c_str(), AT_SYMLINK_FOLLOW) == 0 ? 0 : errno;
-    };
-    return make_beside(target, link, name);
+    platform::lock(descriptor);
+    return make_beside(
+        target, [&](const fs::path& file) { return platform::give_name(descriptor, file); }, name);
 }
 
 fs::path follow_links(fs::path path) {
@@ -97,13 +82,6 @@ fs::path follow_links(fs::path path) {
         path = target.is_absolute() ? target : path.parent_path() / target;
     }
     return path;
-}
-
-void sync_folder(const fs::path& folder) {
-    const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (descriptor < 0) return;
-    ::fsync(descriptor); // best effort: some file systems cannot
-    ::close(descriptor);
 }
 
 } // namespace filigree

@@ -24,7 +24,4 @@ int name_beside(const std::filesystem::path& target, int descriptor, std::filesy
 /// links go round in a circle.
 std::filesystem::path follow_links(std::filesystem::path path);
 
-/// Makes what was renamed in a folder outlast a power cut, where its file system can.
-void sync_folder(const std::filesystem::path& folder);
-
 } // namespace filigree

@@ -1,5 +1,7 @@
 #include "filigree/io/system/text_writer.h"
 
+#include "filigree/core/math.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -21,7 +23,7 @@ TextWriter& TextWriter::far_coordinate(double origin, float offset) {
     const float last_bit = std::abs(offset) * 0x1p-23f;
     const bool is_tiny = offset != 0 && last_bit == 0; // no number of decimals is shorter then
     if (is_tiny) return text({digits, static_cast<std::size_t>(shortest.ptr - digits)});
-    const int guess = offset == 0 ? 0 : static_cast<int>(-std::log10(last_bit)) - 1;
+    const int guess = offset == 0 ? 0 : static_cast<int>(-math::log10(last_bit)) - 1;
     const int first = std::max(0, guess);
     for (int precision = first; precision < first + kTries; ++precision) {
         char rounded[kLongestNumber];

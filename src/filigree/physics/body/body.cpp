@@ -1,4 +1,5 @@
 #include "filigree/physics/body.h"
+#include "filigree/core/math.h"
 #include "filigree/sample/closure.h"
 
 #include "filigree/core/dense_solve.h"
@@ -206,7 +207,7 @@ double field_spacing(const Body& body) {
     Box box;
     for (const auto& corner : body.cells.corners) box.extend(Vec3d(corner[0], corner[1], corner[2]));
     const double points = (box.size().array() / kFieldSpacing + 1).prod();
-    return kFieldSpacing * body.spacing() * std::max(1.0, std::cbrt(points / kMostFieldPoints));
+    return kFieldSpacing * body.spacing() * std::max(1.0, math::cbrt(points / kMostFieldPoints));
 }
 
 /// The distance from the surface at rest. A mesh whose inside is thinner than cells can see counts as a sheet.

@@ -1,6 +1,7 @@
 #include "filigree/physics/body/body_state.h"
 
 #include "filigree/core/dense_solve.h"
+#include "filigree/core/math.h"
 #include "filigree/physics/body/embedding.h"
 
 #include <Eigen/LU>
@@ -90,7 +91,7 @@ void move_attached(const BodyState& state, const Attachment& attachment, std::sp
 
 void set_surface_stiffness(BodyState& state) {
     const Body& body = *state.body;
-    const double modulus = body.material.density * std::pow(pressure_wave_speed(body.material), 2);
+    const double modulus = body.material.density * math::pow(pressure_wave_speed(body.material), 2);
     std::vector<float>& stiffness = state.surface_stiffness;
     stiffness.resize(state.surface.size());
     for (std::size_t s = 0; s < stiffness.size(); ++s)

@@ -1,5 +1,6 @@
 #include "filigree/physics/body.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/sample.h"
@@ -139,7 +140,7 @@ Result<DistanceGrid> make_distance_grid(const Box& box, double spacing, double s
     }
     const std::size_t most = *std::max_element(grid.counts.begin(), grid.counts.end());
     if (points > kMostPoints || most > 65534) {
-        const double coarser = std::max(std::cbrt(points / kMostPoints), double(most) / 65534);
+        const double coarser = std::max(math::cbrt(points / kMostPoints), double(most) / 65534);
         return Error{ErrorCode::unsuitable, "A distance field with a spacing of " + short_number(spacing * scale) +
                                                 " m has more than 2^27 points; give at least " +
                                                 short_number(1.05 * coarser * spacing * scale) + " m."};
@@ -183,7 +184,7 @@ Result<DistanceField> DistanceField::create(const Mesh& mesh, double scale, doub
     const std::vector<std::uint8_t> band = find_band(grid, mesh.positions, welded.triangles);
     std::vector<float> distances(grid.size(), std::numeric_limits<float>::infinity());
     std::vector<Vec3f> closest(grid.size());
-    const ClosestPointTree tree(mesh.positions, welded.triangles);
+    const ClosestPointTree tree(mesh.positions, welded.triangles, context);
     parallel_for(context, grid.counts[1] * grid.counts[2], 16, [&](std::size_t begin, std::size_t end) {
         for (std::size_t row = begin; row < end && !context.is_cancelled(); ++row)
             for (std::size_t i = 0; i < grid.counts[0]; ++i) {

@@ -1,6 +1,7 @@
 #include "filigree/physics/body/embedding.h"
 
 #include "filigree/core/dense_solve.h"
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 
 #include <Eigen/LU>
@@ -280,7 +281,7 @@ void embed_point(const Vec3d& point, const ParticleGrid& grid, const Reached& re
     }
     // Not to be had: what can be had from those around the nearest particle, and no slope where that shoots too far.
     piece.report.far_points += !far;
-    growth = fit.limits.lowest < kLeastWeight ? std::pow(kRadiusGrowth, kAttempts - 1) : 1;
+    growth = fit.limits.lowest < kLeastWeight ? math::pow(kRadiusGrowth, kAttempts - 1) : 1;
     const double radius = reach();
     find(radius);
     fit.solve(point, radius, true);

@@ -1,4 +1,5 @@
 #include "filigree/physics/body/joined_parts.h"
+#include "filigree/core/math.h"
 #include "filigree/sample/closure.h"
 
 #include "filigree/core/parallel_for.h"
@@ -233,8 +234,8 @@ Result<JoinedParts> find_joined_parts(std::span<const Vec3f> positions, const We
 std::string joined_sentence(const JoinedParts& joined, double spacing, std::size_t particles) {
     if (joined.corners == 0) return "";
     const double finer = joined.gap / 2; // for any place of the gap between the cells
-    const double count = double(particles) * std::pow(spacing / finer, 3);
-    const double unit = std::pow(10, std::floor(std::log10(count)) - 1); // of the second digit
+    const double count = double(particles) * math::pow(spacing / finer, 3);
+    const double unit = math::power_of_ten(int(std::floor(math::log10(count))) - 1); // of the second digit
     const Vec3f& at = joined.place;
     return "Parts with a gap between them are nearer to each other than two particles and move as one, at " +
            with_commas(joined.corners) + " corners of cells; the gap is about " + two_digits(joined.gap) +

@@ -1,5 +1,6 @@
 // From a mesh to cells. Everything here is in model units; only the finished cells are in metres.
 #include "filigree/physics/body/mesh_cells.h"
+#include "filigree/core/math.h"
 #include "filigree/physics/body/make_cells.h"
 #include "filigree/sample/closure.h"
 
@@ -104,7 +105,7 @@ Result<Trial> find_spacing(const CellMaker& maker, std::size_t count,
         trial.cells = std::move(cells).value();
         return trial;
     };
-    const auto miss = [&](const Trial& trial) { return std::log(trial.particles / double(count)); };
+    const auto miss = [&](const Trial& trial) { return math::log(trial.particles / double(count)); };
 
     constexpr int kTrials = 6;
     const Vec3d size = maker.box().size();
@@ -115,13 +116,13 @@ Result<Trial> find_spacing(const CellMaker& maker, std::size_t count,
         Result<Trial> trial = try_spacing(spacing);
         if (!trial) return trial.error();
         if (n > 0 && trial->particles != last.particles)
-            slope = std::clamp((miss(*trial) - miss(last)) / std::log(trial->spacing / last.spacing), -3.5, -1.0);
+            slope = std::clamp((miss(*trial) - miss(last)) / math::log(trial->spacing / last.spacing), -3.5, -1.0);
         const bool better = n == 0 || std::abs(miss(*trial)) < std::abs(miss(best));
         last.spacing = trial->spacing;
         last.particles = trial->particles;
         if (better) best = std::move(trial).value();
         if (std::abs(miss(best)) < kCountTolerance) break;
-        const double next = std::min(last.spacing * std::exp(-miss(last) / slope), size.maxCoeff());
+        const double next = std::min(last.spacing * math::exp(-miss(last) / slope), size.maxCoeff());
         if (next == last.spacing) break;
         spacing = next;
     }
@@ -129,7 +130,7 @@ Result<Trial> find_spacing(const CellMaker& maker, std::size_t count,
     const double shortest = size.minCoeff();
     std::optional<Trial> fitted;
     for (const double cells : {std::floor(shortest / best.spacing), std::ceil(shortest / best.spacing)}) {
-        if (cells < 1 || std::abs(std::log(shortest / cells / best.spacing)) > 0.2) continue;
+        if (cells < 1 || std::abs(math::log(shortest / cells / best.spacing)) > 0.2) continue;
         Result<Trial> trial = try_spacing(shortest / cells);
         if (!trial) return trial.error();
         if (std::abs(trial->particles - double(count)) <= kFitTolerance * double(count) &&

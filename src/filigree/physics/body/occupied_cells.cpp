@@ -1,4 +1,5 @@
 #include "filigree/physics/body/occupied_cells.h"
+#include "filigree/core/math.h"
 #include "filigree/sample/closure.h"
 #include "filigree/sample/inside_scan.h"
 
@@ -158,7 +159,7 @@ Result<Grid> make_grid(const Box& box, double spacing, double scale) {
         grid.counts[axis] = std::size_t(std::min(count, 1e9));
     }
     if (cells > kMostGridCells || longest > double(kMostAlong)) {
-        const double coarser = std::max(std::cbrt(cells / kMostGridCells), longest / double(kMostAlong));
+        const double coarser = std::max(math::cbrt(cells / kMostGridCells), longest / double(kMostAlong));
         return Error{ErrorCode::unsuitable, "A spacing of " + number(spacing * scale) +
                                                 " m divides the body's box into too many cells; give at least " +
                                                 number(1.05 * spacing * coarser * scale) + " m."};
@@ -183,7 +184,7 @@ MeshToFill find_mesh_to_fill(const Mesh& mesh, const WeldedTriangles& welded) {
 Error too_many_cells(const Grid& grid, double count, double scale) {
     return {ErrorCode::unsuitable, "A spacing of " + number(grid.spacing * scale) + " m gives about " + number(count) +
                                        " cells, more than 2^26; give at least " +
-                                       number(1.05 * grid.spacing * std::cbrt(count / kMostCells) * scale) + " m."};
+                                       number(1.05 * grid.spacing * math::cbrt(count / kMostCells) * scale) + " m."};
 }
 
 Result<std::vector<Draft>> sample_cells(const MeshToFill& mesh, const Grid& grid, double scale,
@@ -205,7 +206,7 @@ Result<std::vector<Draft>> sample_cells(const MeshToFill& mesh, const Grid& grid
         if (double(cells.size()) > kMostCells)
             return too_many_cells(grid, double(cells.size()) * double(grid.counts[2]) / double(end), scale);
     }
-    if (scans && most / 8 * std::pow(kCloserSamples, 3) <= kMostCloserPoints)
+    if (scans && most / 8 * math::pow(double(kCloserSamples), 3) <= kMostCloserPoints)
         if (const Status closer = look_closer(*sampler, grid, cells, context); !closer) return closer.error();
     return cells;
 }

@@ -1,5 +1,6 @@
 #include "filigree/physics/body/own_weight.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/text.h"
 
 #include <cmath>
@@ -19,7 +20,7 @@ std::string rounded(const char* format, double x) {
 
 /// Rounded down to one digit.
 double one_digit(double x) {
-    const double unit = std::pow(10, std::floor(std::log10(x)));
+    const double unit = math::power_of_ten(int(std::floor(math::log10(x))));
     return std::floor(x / unit * (1 + 1e-9)) * unit;
 }
 

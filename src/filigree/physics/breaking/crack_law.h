@@ -2,6 +2,7 @@
 // layer.
 #pragma once
 
+#include "filigree/core/math.h"
 #include "filigree/core/random.h"
 #include "filigree/physics/breaking/broken_body.h"
 #include "filigree/types.h"
@@ -39,7 +40,7 @@ inline float strength_of(const FractureMaterial& material, Index piece, Index ot
     if (!(material.scatter > 0)) return float(material.strength);
     const double shape = material.scatter / 1.2; // 1 over Weibull's modulus: 1.2 / m is the relative deviation, about
     const double u = random_unit(material.seed, (std::uint64_t{piece} << 32) + other);
-    return float(material.strength * std::pow(-std::log1p(-u), shape) / std::tgamma(1 + shape));
+    return float(material.strength * math::pow(-math::log1p(-u), shape) / math::gamma(1 + shape));
 }
 
 /// J/m^2 that a crack takes to grow: where matter yields first, that as well.

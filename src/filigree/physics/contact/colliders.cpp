@@ -1,5 +1,6 @@
 #include "filigree/physics/contact/colliders.h"
 
+#include "filigree/core/math.h"
 #include "filigree/physics/contact/cell_boxes.h"
 
 #include <algorithm>
@@ -226,7 +227,7 @@ void MatterCollider::put_anchor(Candidate& at, const Vec3f&, const Vec3f& offset
 float MatterCollider::stiffness(const Candidate& at, std::optional<float> area) const {
     if (area) return *area * per_area_[at.place.cell];
     if (matter_.is_rigid()) return body_.surface_stiffness.empty() ? 0 : body_.surface_stiffness.front();
-    const double modulus = body_.body->material.density * std::pow(pressure_wave_speed(body_.body->material), 2);
+    const double modulus = body_.body->material.density * math::pow(pressure_wave_speed(body_.body->material), 2);
     float stiffness = float(modulus * body_.body->spacing());
     for (const auto& [particle, weight] : carriers_of(body_, matter_, at.place))
         if (const float part = std::abs(weight); part > 1e-3f)

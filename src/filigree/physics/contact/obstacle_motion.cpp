@@ -1,5 +1,7 @@
 #include "filigree/physics/contact/obstacle_motion.h"
 
+#include "filigree/core/math.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -29,7 +31,7 @@ Vec3d spin_of(const Vec3d& angle, const Vec3d& rate) {
     const double radians = angle.norm();
     if (radians < 1e-6) return rate + 0.5 * angle.cross(rate);
     const Vec3d axis = angle / radians;
-    const double along = std::sin(radians) / radians, across = (1 - std::cos(radians)) / radians;
+    const double along = math::sin(radians) / radians, across = (1 - math::cos(radians)) / radians;
     return along * rate + (1 - along) * axis.dot(rate) * axis + across * axis.cross(rate);
 }
 

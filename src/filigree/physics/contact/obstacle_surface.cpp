@@ -1,5 +1,6 @@
 #include "filigree/physics/contact/obstacle_surface.h"
 
+#include "filigree/core/math.h"
 #include "filigree/mesh/surface.h"
 #include "filigree/mesh/triangle_point.h"
 #include "filigree/sample/closure.h"
@@ -333,7 +334,7 @@ ClosestWall ObstacleSurface::closest(const Vec3d& point, double reach) const {
         double angle = 0;
         for (std::size_t k = 0; k < 3; ++k) {
             const Vec3d a = of[k] - found.position, b = of[(k + 1) % 3] - found.position;
-            if (a.norm() > beside && b.norm() > beside) angle += std::atan2(a.cross(b).norm(), a.dot(b));
+            if (a.norm() > beside && b.norm() > beside) angle += math::atan2(a.cross(b).norm(), a.dot(b));
         }
         found.normal += angle * planes_[triangle].normal;
     });

@@ -1,4 +1,5 @@
 // The fem material: what cell_kernel computes, behind the interface of all materials; the energy in double.
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_sum.h"
 #include "filigree/physics/body.h"
 #include "filigree/physics/body/make_cells.h"
@@ -24,7 +25,7 @@ double cell_energy(const cell_kernel::CellMaterial& m, const std::array<Vec3d, 8
     const double shear = m.shear, bulk = m.bulk, g = m.rest_ratio;
     // (J - g)^2 - (1 - g)^2 and log(I + 1) - log(4) as products: a body near rest has an energy, not rounding.
     return fraction * h * h * h *
-           (shear * (0.5 * ((I - 3) - std::log1p((I - 3) / 4)) + cell_kernel::bent_energy(I_bent)) +
+           (shear * (0.5 * ((I - 3) - math::log1p((I - 3) / 4)) + cell_kernel::bent_energy(I_bent)) +
             bulk * (0.5 * (J - 1) * (J + 1 - 2 * g) + cell_kernel::crush_energy(m, J, filled)));
 }
 

@@ -1,5 +1,6 @@
 #include "filigree/physics/fem/plastic_cells.h"
 
+#include "filigree/core/math.h"
 #include "filigree/physics/breaking/crack_law.h"
 #include "filigree/physics/fem/cell_kernel.h"
 
@@ -52,7 +53,7 @@ void yield(PlasticCell& cell, const CellSums& sums, float size, const FlowLaw& l
     if (!std::isfinite(all.beside) || !flow(gradient, all, R, &kept)) return;
     PlasticCell after = cell;
     after.inverse *= R;
-    after.inverse /= std::cbrt(after.inverse.determinant());
+    after.inverse /= math::cbrt(after.inverse.determinant());
     const Mat3f back = linear_part(sums).inverse();
     for (int b = 0; b < 4; ++b) after.bent[b] += (1 - kept) * (back * elastic[kBentSums[b]]);
     if (!after.is_sound()) return;

@@ -3,6 +3,7 @@
 //     Xe = [X_1 X_2 X_4] D  and  Xe_k = X_k - [X_1 X_2 X_4] b_k,  k = 3, 5, 6, 7,
 // so volume is as elastic as before, and turning a cell costs nothing. Once a substep strain beyond the yield stress
 // goes over into D and b [Simo 1992].
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/parallel_sum.h"
 #include "filigree/physics/body.h"
@@ -215,7 +216,8 @@ private:
         for (const int m : kBentSums) bent += square(m);
         const double J = X[1].cast<double>().dot(X[2].cast<double>().cross(X[4].cast<double>())) / (size * size * size);
         return double(body_.cells.fraction[cell]) * h * h * h *
-               (double(material_.shear) * (0.5 * ((I - 3) - std::log1p((I - 3) / 4)) + cell_kernel::bent_energy(bent)) +
+               (double(material_.shear) *
+                    (0.5 * ((I - 3) - math::log1p((I - 3) / 4)) + cell_kernel::bent_energy(bent)) +
                 double(material_.bulk) * (0.5 * (J - 1) * (J + 1 - 2 * g) +
                                           cell_kernel::crush_energy(material_, J, body_.cells.fraction[cell])));
     }

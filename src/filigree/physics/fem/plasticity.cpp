@@ -4,6 +4,8 @@
 //   stretch alone: with Fe = U s V^T, the flow multiplies Fe from the right by V (s' / s) V^T.
 #include "filigree/physics/fem/plasticity.h"
 
+#include "filigree/core/math.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -12,7 +14,7 @@ namespace filigree {
 FlowLaw yield_law(const Material& material, float dt) {
     const double shear = lame_parameters(material.young_modulus, material.poisson_ratio).mu;
     FlowLaw law{float(std::sqrt(2 / 3.) * material.yield_stress / (2 * shear)), 1};
-    if (material.creep_time > 0) law.yield_rate = float(-std::expm1(-double(dt) / material.creep_time));
+    if (material.creep_time > 0) law.yield_rate = float(-math::expm1(-double(dt) / material.creep_time));
     return law;
 }
 
@@ -69,8 +71,8 @@ bool flow(const Mat3f& elastic, const FlowLaw& law, Mat3f& R, float* kept_part) 
     symmetric_eigen(C, values, V);
     Vec3f log_old, log_new;
     for (int a = 0; a < 3; ++a) {
-        log_old[a] = 0.5f * std::log(std::max(values[a], 1e-12f));
-        log_new[a] = std::max(log_old[a], std::log(kLeastStretch));
+        log_old[a] = 0.5f * math::log(std::max(values[a], 1e-12f));
+        log_new[a] = std::max(log_old[a], math::log(kLeastStretch));
     }
     const float volume = log_new.sum() / 3;
     Vec3f deviator = log_new - Vec3f::Constant(volume);
@@ -81,7 +83,7 @@ bool flow(const Mat3f& elastic, const FlowLaw& law, Mat3f& R, float* kept_part) 
     if (kept_part) *kept_part = kept;
     deviator *= kept;
     Vec3f ratio;
-    for (int a = 0; a < 3; ++a) ratio[a] = std::exp(volume + deviator[a] - log_old[a]);
+    for (int a = 0; a < 3; ++a) ratio[a] = math::exp(volume + deviator[a] - log_old[a]);
     R = V * ratio.asDiagonal() * V.transpose();
     return true;
 }

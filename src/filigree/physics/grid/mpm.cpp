@@ -1,5 +1,6 @@
 #include "filigree/physics/grid/mpm.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/grid/mpm_contact.h"
 #include "filigree/physics/step/byte_stream.h"
@@ -316,7 +317,7 @@ void Bodies::gather(float dt, double time, const RunContext& context) {
                 const std::span<const std::uint32_t> numbers = grid_.particles(group[g]);
                 const std::uint32_t field = grid_.place(group[g]).body;
                 const Matter& matter = matter_[field];
-                const float kept = std::exp(-dt * matter.damping());
+                const float kept = math::exp(-dt * matter.damping());
                 exchange.go_to(grid_.place(group[g]), poses, near);
                 if (!barriers_.empty()) barriers_.go_to(grid_.place(group[g]), walls);
                 const Index behind = grid_.behind(group[g]);

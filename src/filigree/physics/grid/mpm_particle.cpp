@@ -1,5 +1,7 @@
 #include "filigree/physics/grid/mpm_particle.h"
 
+#include "filigree/core/math.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -240,7 +242,7 @@ void Matter::deform(std::span<const std::uint32_t> numbers, Particle* particles,
 double Matter::energy(const Particle& p) const {
     const double j = double(p.volume_ratio()), l = double(liquid(p.enthalpy()));
     const double trace = double(p.b[0] + p.b[1] + p.b[2]) - 3;
-    double volumetric = 0.5 * double(bulk_) * (0.5 * (j * j - 1) - std::log(j));
+    double volumetric = 0.5 * double(bulk_) * (0.5 * (j * j - 1) - math::log(j));
     if (j > 1) volumetric *= 1 - l;
     return double(p.volume) * (0.5 * double(shear_) * (1 - l) * trace + volumetric);
 }

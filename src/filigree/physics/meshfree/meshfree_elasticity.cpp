@@ -12,6 +12,7 @@
 //     f_ij = s_ij (B_i + B_j) X_ij + s_ij (z_i + z_j) x_ij,   B = V P D^T M^-1 - z F,
 // which each particle sums up over its own neighbours: no scatter, and momentum to the last bit of each pair.
 // Neighbours are those at rest for ever: strain is bounded (kMostFlowed), and what flows further is mpm's.
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/parallel_sum.h"
 #include "filigree/physics/body.h"
@@ -173,7 +174,7 @@ private:
         if (const Mat3f* inverse = plastic_.inverse()) Fe = Fe * inverse[i].cast<double>();
         const Moduli& m = moduli_[i];
         const double mu = double(m.mu), L = double(m.L), g0 = double(m.g0), I = Fe.squaredNorm(), J = Fe.determinant();
-        double sum = double(body_.volume[i]) * (0.5 * mu * (I - 3 - std::log((I + 1) / 4)) +
+        double sum = double(body_.volume[i]) * (0.5 * mu * (I - 3 - math::log((I + 1) / 4)) +
                                                 0.5 * L * ((J - g0) * (J - g0) - (1 - g0) * (1 - g0)));
         for (std::size_t k = neighbours_.offsets[i]; k < neighbours_.offsets[i + 1]; ++k) {
             const Float4 pair = neighbours_.pairs[k];

@@ -1,5 +1,6 @@
 #include "filigree/physics/meshfree/meshfree_plastic.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/fem/plasticity.h"
 
@@ -19,7 +20,7 @@ void yield_particle(Mat3f& inverse, const Mat3f& gradient, const FlowLaw& law) {
     Mat3f R;
     if (!filigree::flow(elastic, law, R)) return;
     Mat3f after = inverse * R;
-    after /= std::cbrt(after.determinant());
+    after /= math::cbrt(after.determinant());
     if (!after.allFinite() || (flowed(after) > kMostFlowed && flowed(after) > flowed(inverse))) return;
     inverse = after;
 }

@@ -1,6 +1,7 @@
 #include "filigree/physics/rigid/rigid_body.h"
 
 #include "filigree/core/dense_solve.h"
+#include "filigree/core/math.h"
 #include "filigree/physics/rigid/rigid_state.h"
 
 #include <Eigen/Geometry>
@@ -162,7 +163,7 @@ void drift_rigid(BodyState& body, double dt) {
         const Vec3d angle = seconds * (r * pose.inverse_inertia * r.transpose() * pose.angular);
         const double length = angle.norm();
         if (!(length > 0)) return from;
-        return Eigen::Quaterniond(Eigen::AngleAxisd(length, angle / length)) * from;
+        return math::quaternion(Eigen::AngleAxisd(length, angle / length)) * from;
     };
     half = turn_by(pose.turn, pose.turn, dt / 2);
     pose.turn = turn_by(pose.turn, half, dt).normalized();

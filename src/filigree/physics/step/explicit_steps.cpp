@@ -1,5 +1,6 @@
 // Velocity Verlet: kick, drift, kick. The stable step follows from the squared frequencies that are found with the
 // forces.
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/contact/contact_law.h"
 #include "filigree/physics/rigid/rigid_body.h"
@@ -143,7 +144,7 @@ double deforming_step(const BodyState& body) {
         return double(most - least);
     };
     const Vectors& v = body.velocities;
-    const double speed = std::hypot(spread(v.x, v.size()), spread(v.y, v.size()), spread(v.z, v.size()));
+    const double speed = Vec3d(spread(v.x, v.size()), spread(v.y, v.size()), spread(v.z, v.size())).norm();
     return speed > 0 ? kMostDeforming * body.body->spacing() / speed : kNoLimit;
 }
 
@@ -241,7 +242,7 @@ private:
         const Vec3d& gravity = state_.world.gravity;
         rigid_contacts_.prepare(bodies_, gravity, context_);
         each_awake_rigid([&](BodyState& body, std::size_t b) {
-            kick_rigid(body, rigid_loads_[b], Vec3d::Zero(), 0.5 * dt, std::exp(-dt * body.body->material.damping));
+            kick_rigid(body, rigid_loads_[b], Vec3d::Zero(), 0.5 * dt, math::exp(-dt * body.body->material.damping));
             kick_rigid(body, {}, gravity, dt, 1); // undamped: what lies has its whole weight
         });
         rigid_contacts_.solve(bodies_, dt, context_);
@@ -468,7 +469,7 @@ private:
     void kick(float dt, bool damp) {
         const Vec3f gravity = state_.world.gravity.cast<float>();
         each_awake([&](BodyState& body, std::size_t) {
-            const double kept = damp ? std::exp(-2 * double(dt) * body.body->material.damping) : 1;
+            const double kept = damp ? math::exp(-2 * double(dt) * body.body->material.damping) : 1;
             if (body.rigid) return;
             parallel_for(context_, body.positions.size(), kExplicitStepsGrain, [&](std::size_t begin, std::size_t end) {
                 const float* inverse_mass = body.inverse_mass.data();

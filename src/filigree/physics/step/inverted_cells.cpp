@@ -1,5 +1,7 @@
 #include "filigree/physics/step/inverted_cells.h"
 
+#include "filigree/core/math.h"
+
 #include <cmath>
 
 namespace filigree {
@@ -13,7 +15,7 @@ bool has_cells(const BodyState& body) {
 
 void look_at_cells(const BodyState& body, InvertedCells& found) {
     const Cells& cells = body.body->cells;
-    const double rest = 64 * std::pow(cells.spacing, 3); // of the sums below
+    const double rest = 64 * math::pow(cells.spacing, 3); // of the sums below
     for (const std::array<Index, 8>& corners : cells.cell_corners) {
         Mat3d sides = Mat3d::Zero(); // four times the mean side along each axis
         Vec3d middle = Vec3d::Zero();

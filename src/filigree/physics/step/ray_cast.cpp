@@ -1,5 +1,6 @@
 #include "filigree/physics/step/ray_cast.h"
 
+#include "filigree/core/math.h"
 #include "filigree/physics/contact/obstacle_surface.h"
 
 #include <algorithm>
@@ -239,7 +240,7 @@ private:
 std::optional<WorldHit> meet_particles(const BodyState& body, const Ray& ray) {
     std::optional<WorldHit> best;
     for (std::size_t i = 0; i < body.positions.size(); ++i) {
-        const double radius = kBall * std::cbrt(double(body.body->volume[i]));
+        const double radius = kBall * math::cbrt(double(body.body->volume[i]));
         const auto met = meet_ball(body.positions[i].cast<double>(), radius, ray);
         if (met && met->distance <= ray.reach && (!best || met->distance < best->distance))
             best = hit_of(met->distance, met->normal, body.body->rest[i]);

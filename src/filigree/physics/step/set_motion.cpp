@@ -1,5 +1,7 @@
 #include "filigree/physics/step/set_motion.h"
 
+#include "filigree/core/math.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -12,17 +14,17 @@ constexpr double kEver = 1 << 20; ///< s, a power of two: rates stay as they are
 
 Mat3d turn_by(const Vec3d& angle) {
     const double radians = angle.norm();
-    return radians > 0 ? Eigen::AngleAxisd(radians, angle / radians).toRotationMatrix() : Mat3d(Mat3d::Identity());
+    return radians > 0 ? math::matrix(Eigen::AngleAxisd(radians, angle / radians)) : Mat3d(Mat3d::Identity());
 }
 
 /// Axis times radians of a turn; with whole turns added until it is as near as can be to what is expected.
 Vec3d angle_of(const Mat3d& turn, const Vec3d& expected) {
     const Vec3d rest = [&] {
-        const Eigen::AngleAxisd more(turn * turn_by(expected).transpose());
+        const Eigen::AngleAxisd more = math::angle_axis(turn * turn_by(expected).transpose());
         return Vec3d(more.angle() * more.axis());
     }();
     if (!(rest.norm() > 1e-12)) return expected;
-    const Eigen::AngleAxisd whole(turn);
+    const Eigen::AngleAxisd whole = math::angle_axis(turn);
     const double turns = std::round((expected.dot(whole.axis()) - whole.angle()) / (2 * std::numbers::pi));
     return (whole.angle() + 2 * std::numbers::pi * turns) * whole.axis();
 }

@@ -1,5 +1,7 @@
 #include "filigree/physics/step/vibration.h"
 
+#include "filigree/core/math.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -52,7 +54,7 @@ bool calm_rubbing(BodyState& body, bool touches, bool rubs, double seconds) {
     const double until_calmed = kUntilCalmed * 2 * std::numbers::pi / lowest_frequency(*body.body);
     body.rubbed_seconds = std::min(body.rubbed_seconds + step, float(2 * until_calmed));
     if (double(body.rubbed_seconds) < until_calmed) return false;
-    scale_vibration(body, std::exp(-2 * kRubbingDamping * thickness_frequency(*body.body) * seconds));
+    scale_vibration(body, math::exp(-2 * kRubbingDamping * thickness_frequency(*body.body) * seconds));
     return true;
 }
 

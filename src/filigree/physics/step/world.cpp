@@ -1,5 +1,7 @@
 #include "filigree/physics/world.h"
 
+#include "filigree/core/math.h"
+
 #include <algorithm>
 
 namespace filigree {
@@ -39,7 +41,7 @@ Eigen::Isometry3d RigidMotion::at(double time) const {
     const Vec3d turned = angle.at(time);
     const double radians = turned.norm();
     const Mat3d turn =
-        radians > 0 ? Eigen::AngleAxisd(radians, turned / radians).toRotationMatrix() : Mat3d(Mat3d::Identity());
+        radians > 0 ? math::matrix(Eigen::AngleAxisd(radians, turned / radians)) : Mat3d(Mat3d::Identity());
     Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
     motion.linear() = turn;
     motion.translation() = centre - turn * centre + move.at(time);

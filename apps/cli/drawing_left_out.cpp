@@ -1,0 +1,58 @@
+#include "commands.h"
+#include "drawing.h"
+
+#include "filigree/io/system/extension.h"
+#include "filigree/io/system/numbered_name.h"
+
+namespace filigree::cli {
+
+namespace {
+
+[[noreturn]] void refuse_to_draw(const std::string& path) {
+    refuse(ErrorCode::unsupported, path + ": this program draws no pictures and no films, as it was built without the "
+                                          "renderer; write a .glb, and look at it in another program.");
+}
+
+} // namespace
+
+std::vector<Command> drawing_commands() { return {}; }
+
+void check_picture_path(const std::string& path) { refuse_to_draw(path); }
+void check_png_path(const std::string& path) { refuse_to_draw(path); }
+
+// Nobody comes here: their paths are checked before.
+void draw_distances(const Mesh&, const Mesh&, const std::array<std::string, 2>&, const MeshDistance&, UpAxis,
+                    const std::string& path, Session&) {
+    refuse_to_draw(path);
+}
+void draw_expected_error(const Model&, const PoseError::Estimate&, const Mesh&, const std::string&, UpAxis,
+                         const std::string& path, Session&) {
+    refuse_to_draw(path);
+}
+void draw_quads(const QuadRemeshed&, View, UpAxis, const std::string& path, Session&) { refuse_to_draw(path); }
+void draw_points_inside(const Mesh&, const std::vector<Vec3f>&, double, UpAxis, const std::string& path, Session&) {
+    refuse_to_draw(path);
+}
+
+std::vector<std::string> draw_demo(const DemoScene&, const std::function<Pose(double)>&, const std::string&,
+                                   const std::string&, Session& session) {
+    session.warn("No picture and no film: this program was built without the renderer.");
+    return {};
+}
+
+/// Textures are pictures too.
+std::vector<BodyLook> looks_of_bodies(const ReadyScene& ready, Session&) {
+    return std::vector<BodyLook>(ready.bodies.size());
+}
+
+bool is_film(const std::string& path) {
+    const std::string ending = lower_extension(path);
+    return ending == ".mp4" || ending == ".gif" || (ending == ".png" && printf_numbered_name(path));
+}
+
+struct SceneFilms::Films {};
+SceneFilms::SceneFilms(const std::vector<std::string>& paths, const SceneFile&) { refuse_to_draw(paths.front()); }
+SceneFilms::~SceneFilms() = default;
+void SceneFilms::write(const SceneFile&, const ReadyScene&, const Recording&, Session&) {}
+
+} // namespace filigree::cli
