@@ -1,5 +1,7 @@
 #include "spill.h"
 
+#include "filigree/core/numbers.h"
+
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -34,7 +36,7 @@ std::uint64_t memory_to_use() {
 
 std::uint64_t parse_memory_size(const std::string& text) {
     double number = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    const auto [end, error] = number_from_chars(text.data(), text.data() + text.size(), number);
     if (error != std::errc()) return 0;
     std::string unit(end, text.data() + text.size());
     for (char& c : unit) c = char(std::toupper(static_cast<unsigned char>(c)));

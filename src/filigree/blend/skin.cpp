@@ -21,8 +21,8 @@ struct Influence {
 
 /// One entry a joint, none without weight, the largest first (among equals the lower joint).
 void merge(std::vector<Influence>& influences) {
-    std::sort(influences.begin(), influences.end(),
-              [](const Influence& a, const Influence& b) { return a.joint < b.joint; });
+    std::stable_sort(influences.begin(), influences.end(), // weights of one joint are added in the order they came in
+                     [](const Influence& a, const Influence& b) { return a.joint < b.joint; });
     std::size_t kept = 0;
     for (const Influence& influence : influences) {
         if (kept > 0 && influences[kept - 1].joint == influence.joint)

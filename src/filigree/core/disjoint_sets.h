@@ -1,9 +1,9 @@
 // Which things belong together, as pairs of them are joined.
 #pragma once
 
+#include "filigree/core/atomic_ref.h"
 #include "filigree/types.h"
 
-#include <atomic>
 #include <numeric>
 #include <utility>
 
@@ -22,7 +22,7 @@ public:
             if (parent == i) return i;
             const Index above = load(parent);
             // Halve the path. A slower thread may put an older ancestor back, which only keeps the path longer.
-            if (above != parent) std::atomic_ref(parent_[i]).store(above, std::memory_order_relaxed);
+            if (above != parent) atomic_ref(parent_[i]).store(above, std::memory_order_relaxed);
             i = above;
         }
     }
@@ -35,13 +35,13 @@ public:
             if (a == b) return false;
             if (a > b) std::swap(a, b);
             Index expected = b;
-            if (std::atomic_ref(parent_[b]).compare_exchange_strong(expected, a, std::memory_order_relaxed))
+            if (atomic_ref(parent_[b]).compare_exchange_strong(expected, a, std::memory_order_relaxed))
                 return true;
         }
     }
 
 private:
-    Index load(Index i) { return std::atomic_ref(parent_[i]).load(std::memory_order_relaxed); }
+    Index load(Index i) { return atomic_ref(parent_[i]).load(std::memory_order_relaxed); }
     std::vector<Index> parent_; ///< never above the index itself; once below it, never back
 };
 

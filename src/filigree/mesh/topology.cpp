@@ -2,6 +2,7 @@
 // edges side by side, and joined over those edges, its fans. So one pass over vertices, in parallel, finds it all.
 #include "filigree/mesh.h"
 
+#include "filigree/core/atomic_ref.h"
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/random.h"
@@ -10,7 +11,6 @@
 #include "filigree/mesh/weld.h"
 
 #include <algorithm>
-#include <atomic>
 
 namespace filigree {
 namespace {
@@ -110,7 +110,7 @@ private:
         for (std::size_t i = 0; i < corners.size(); ++i) {
             const Index face = in_.polygons.face(corners[i]);
             if (i > 0 && in_.polygons.face(corners[i - 1]) == face)
-                std::atomic_ref(in_.degenerate[face]).store(1, std::memory_order_relaxed);
+                atomic_ref(in_.degenerate[face]).store(1, std::memory_order_relaxed);
             if (in_.collapsed[face]) continue;
             const Index before = mesh_.corners[in_.polygons.previous(corners[i])];
             if (before == vertex) continue; // seen from the first of the corners that repeat one another

@@ -6,10 +6,10 @@
 // by about two, so terms of second order need no care.
 #include "filigree/sample/inside_scan_kernel.h"
 
+#include "filigree/core/atomic_ref.h"
 #include "filigree/core/lanes.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cassert>
 #include <cmath>
 #include <cstring>
@@ -151,7 +151,7 @@ void put(const Job& job, std::size_t entry, bool leaves) {
         std::uint64_t& word = job.bits[entry >> 6];
         const std::uint64_t bit = std::uint64_t{1} << (entry & 63);
         if (job.shared)
-            std::atomic_ref(word).fetch_xor(bit, std::memory_order_relaxed);
+            atomic_ref(word).fetch_xor(bit, std::memory_order_relaxed);
         else
             word ^= bit;
     } else {
@@ -159,7 +159,7 @@ void put(const Job& job, std::size_t entry, bool leaves) {
         const std::int16_t change = leaves ? -1 : 1;
         std::int16_t before;
         if (job.shared)
-            before = std::atomic_ref(sum).fetch_add(change, std::memory_order_relaxed);
+            before = atomic_ref(sum).fetch_add(change, std::memory_order_relaxed);
         else {
             before = sum;
             sum = std::int16_t(sum + change);

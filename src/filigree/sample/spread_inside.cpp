@@ -101,7 +101,9 @@ private:
     static constexpr std::array<Step, 27> kSteps = [] {
         std::array<Step, 27> steps;
         for (int n = 0; n < 27; ++n) steps[n] = {n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
-        std::ranges::sort(steps, {}, [](const Step& s) { return s[0] * s[0] + s[1] * s[1] + s[2] * s[2]; });
+        std::ranges::sort(steps, {}, [](const Step& s) {
+            return std::array{s[0] * s[0] + s[1] * s[1] + s[2] * s[2], s[2], s[1], s[0]};
+        });
         return steps;
     }();
     static constexpr std::size_t kBlockCells = 64; ///< 4^3, side by side in memory

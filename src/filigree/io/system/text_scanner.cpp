@@ -31,7 +31,7 @@ bool is_above_one(std::string_view number) {
 const char* parse_number_exactly(const char* p, const char* end, double& value) {
     const bool plus = p < end && *p == '+'; // which from_chars does not take
     if (plus && p + 1 < end && p[1] == '-') return p;
-    const auto [last, error] = std::from_chars(p + (plus ? 1 : 0), end, value);
+    const auto [last, error] = number_from_chars(p + (plus ? 1 : 0), end, value);
     if (error == std::errc::invalid_argument) return p;
     if (error == std::errc::result_out_of_range) {
         const std::string_view number(p, static_cast<std::size_t>(last - p));

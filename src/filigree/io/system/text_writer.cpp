@@ -30,7 +30,7 @@ TextWriter& TextWriter::far_coordinate(double origin, float offset) {
         const auto fixed = std::to_chars(rounded, rounded + sizeof rounded, sum, std::chars_format::fixed, precision);
         if (fixed.ec != std::errc{} || fixed.ptr - rounded >= shortest.ptr - digits) break;
         double read_back = 0;
-        std::from_chars(rounded, fixed.ptr, read_back);
+        number_from_chars(rounded, fixed.ptr, read_back);
         if (static_cast<float>(read_back - origin) == offset)
             return text({rounded, static_cast<std::size_t>(fixed.ptr - rounded)});
     }

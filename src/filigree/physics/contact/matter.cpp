@@ -193,7 +193,7 @@ std::optional<Index> Matter::neighbour(Index cell, Vec3f& local) const {
     const auto& at = body_.cells.cells[cell];
     std::array<int, 3> order = {0, 1, 2};
     const auto outside = [&](int axis) { return std::max(-local[axis], local[axis] - 1); };
-    std::ranges::sort(order, std::greater{}, outside);
+    std::ranges::stable_sort(order, std::greater{}, outside);
     for (const int axis : order) {
         if (!(outside(axis) > 0)) break;
         std::array<int, 3> next = {at[0], at[1], at[2]};
