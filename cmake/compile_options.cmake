@@ -12,7 +12,7 @@ elseif(heap_before_search LESS 600000)
 endif()
 target_compile_options(filigree_options INTERFACE
   -Wall -Wextra -Wno-restrict -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread -Wno-free-nonheap-object  # false alarms about std::string and std::vector, GCC 12
-  $<$<CXX_COMPILER_ID:Clang>:-Wno-unknown-warning-option>
+  $<$<CXX_COMPILER_ID:Clang>:-Wno-unknown-warning-option -Wno-bitwise-instead-of-logical -Wno-shadow>  # clang's finds names of other sources in a unity build
   -Wshadow -Wconversion -Wno-sign-conversion -Wno-psabi
   -ffp-contract=off      # no fused multiply-add: the same bytes whatever the processor has
   $<$<BOOL:${FILIGREE_STRICT}>:-Werror>

@@ -3,6 +3,8 @@
 #include "session.h"
 #include "usage_errors.h"
 
+#include "filigree/core/numbers.h"
+
 #include <charconv>
 #include <cmath>
 

@@ -179,7 +179,8 @@ FILIGREE_INLINE void count_leaf(const RayLeaf& leaf, const Vec3d& eye, const Vec
         count.crossings += static_cast<std::uint64_t>(all);
         count.net += 2 * std::popcount(lanes & seen_from_front) - all;
     };
-    const unsigned seen_from_front = lane_bits<Avx2>(eye_side > 0);
+    const Long4 in_front = eye_side > 0;
+    const unsigned seen_from_front = lane_bits<Avx2>(in_front);
     add(lane_bits<Avx2>(crossed), seen_from_front);
     for (unsigned lanes = lane_bits<Avx2>(open); lanes != 0; lanes &= lanes - 1)
         if (crosses_exactly(leaf, std::countr_zero(lanes), eye, point, count.tally))

@@ -1,5 +1,6 @@
 // Based on: [Clinger 1990], which decimal numbers need a single exact operation (in the header).
 #include "filigree/io/system/text_scanner.h"
+#include "filigree/core/numbers.h"
 #include "filigree/core/text.h"
 
 #include <algorithm>

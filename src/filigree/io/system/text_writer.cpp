@@ -1,6 +1,7 @@
 #include "filigree/io/system/text_writer.h"
 
 #include "filigree/core/math.h"
+#include "filigree/core/numbers.h"
 
 #include <algorithm>
 #include <cmath>
