@@ -18,7 +18,7 @@ target_compile_options(filigree_options INTERFACE
   $<$<BOOL:${FILIGREE_STRICT}>:-Werror>
   $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=${heap_before_search}>)
 if(CMAKE_UNITY_BUILD) # sources look like headers then
-  target_compile_options(filigree_options INTERFACE -Wno-subobject-linkage)
+  target_compile_options(filigree_options INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wno-subobject-linkage>)
 endif()
 if(BUILD_SHARED_LIBS) # calls of our own stay direct, as in a static library
   target_compile_options(filigree_options INTERFACE -fno-semantic-interposition)

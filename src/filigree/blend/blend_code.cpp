@@ -17,8 +17,10 @@ constexpr float kWeightStep = 1.0f / 32767.0f; // of an int16 weight
 /// m: the point of the cell that a record hangs on.
 Vec3d anchor(const Triangle& cell, double u, double v, std::span<const Vec3f> positions,
              std::span<const Index> driver) {
-    return (1 - u - v) * positions[driver[cell[0]]].cast<double>() + u * positions[driver[cell[1]]].cast<double>() +
-           v * positions[driver[cell[2]]].cast<double>();
+    Vec3d m;
+    flg_anchor(positions[driver[cell[0]]].data(), positions[driver[cell[1]]].data(), positions[driver[cell[2]]].data(),
+               u, v, m.data());
+    return m;
 }
 
 float round_weight(float w) { return std::round(w * 32767.0f) * kWeightStep; }
@@ -94,10 +96,9 @@ void decode_rest(const BlendDetail& detail, std::span<const Index> driver, std::
     for (Index v : driver) driver_rest.push_back(positions[v]);
     for (std::size_t c = 0; c < detail.cells.size(); ++c)
         for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
-            const auto& d = detail.offsets[r];
-            const Vec3d offset = double(detail.cell_scales[c]) * Vec3d(d[0], d[1], d[2]);
-            positions[detail.order[r]] =
-                (anchor(detail.cells[c], detail.u[r], detail.v[r], positions, driver) + offset).cast<float>();
+            const Vec3d m = anchor(detail.cells[c], detail.u[r], detail.v[r], positions, driver);
+            flg_rest_of_steps(m.data(), detail.cell_scales[c], detail.offsets[r].data(),
+                              positions[detail.order[r]].data());
         }
     for (std::size_t i = 0; i < driver.size(); ++i) positions[driver[i]] = driver_rest[i];
 }
@@ -111,17 +112,6 @@ struct BlendRestorer::Content {
 namespace {
 
 constexpr std::size_t kRestorerGrain = 16384;
-
-/// A power of two that keeps a driver's digits: both it and its inverse are floats, and so is what lies far from the
-/// driver, as a vertex that no face uses may. Lengths in model units.
-double scale_inside(double driver, double all) {
-    constexpr double kSmall = 1e-15, kLarge = 1e15, kLargest = 1e30;
-    const double size = driver > 0 ? driver : all;
-    if (!(size > 0) || (size >= kSmall && size <= kLarge && all <= kLargest)) return 1;
-    const double wanted = std::round(math::log2(size));
-    const double least = std::ceil(math::log2(all / kLargest));
-    return math::exp2(-std::min(std::max(wanted, least), 127.0));
-}
 
 struct WantedRecord {
     Index cell, record, item;
@@ -223,7 +213,7 @@ BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> p
     Box box; // the driver's, which files of either precision keep to the bit
     for (Index v : driver) box.extend(positions[v].cast<double>());
     const Vec3d centre = box.centre();
-    content_->scale = scale_inside(box.diagonal(), bounds(positions).diagonal());
+    content_->scale = flg_inner_scale(box.diagonal(), bounds(positions).diagonal());
     const double scale = content_->scale;
     for (Index v : driver) content_->rest.push_back(scale * (positions[v].cast<double>() - centre));
 
@@ -247,9 +237,10 @@ BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> p
             }
             records.u[at] = detail.u[r];
             records.v[at] = detail.v[r];
-            const Vec3d m = scale * (anchor(detail.cells[c], detail.u[r], detail.v[r], positions, driver) - centre);
-            const Vec3d q = scale * (positions[detail.order[r]].cast<double>() - centre) - 0.5 * m;
-            for (int k = 0; k < 3; ++k) records.q[k][at] = static_cast<float>(q[k]);
+            const Vec3d m = anchor(detail.cells[c], detail.u[r], detail.v[r], positions, driver);
+            Vec3f q;
+            flg_rest_offset(positions[detail.order[r]].data(), m.data(), centre.data(), scale, q.data());
+            for (int k = 0; k < 3; ++k) records.q[k][at] = q[k];
         }
     });
 }
@@ -266,16 +257,8 @@ std::vector<blend_kernel::VertexTransform> BlendRestorer::transforms(std::span<c
     const std::vector<Vec3d>& rest = content_->rest;
     std::vector<blend_kernel::VertexTransform> transforms(rest.size());
     parallel_for(context, rest.size(), 4096, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            const Vec3d half = 0.5 * rest[i];
-            const Vec3d t = content_->scale * driver_positions[i].cast<double>() - gradients[i].cast<double>() * half;
-            blend_kernel::VertexTransform& transform = transforms[i];
-            for (int k = 0; k < 3; ++k) {
-                transform.t[k] = static_cast<float>(t[k]);
-                transform.half_rest[k] = static_cast<float>(half[k]);
-            }
-            std::copy_n(gradients[i].data(), 9, transform.a);
-        }
+        flg_make_transforms(rest.front().data(), content_->scale, driver_positions.front().data(),
+                            gradients.front().data(), begin, end, transforms.data());
     });
     return transforms;
 }

@@ -18,11 +18,12 @@
 #include <cstdint>
 #include <memory>
 
+struct flg_transform; // runtime/rt_kernel.h
+
 namespace filigree {
 
 namespace blend_kernel {
 struct Records;
-struct VertexTransform;
 } // namespace blend_kernel
 
 /// Sorts bonds into records; for int16 rounds the weights first, then the offsets from them, so that rounding the
@@ -63,9 +64,8 @@ public:
     /// What restore hands to the kernel, for kernels elsewhere (the GPU's): everything that stays, what a pose gives
     /// (one a driver vertex), and the power of two that restored positions are multiplied with.
     const blend_kernel::Records& records() const;
-    std::vector<blend_kernel::VertexTransform> transforms(std::span<const Vec3f> driver_positions,
-                                                          std::span<const Mat3f> gradients,
-                                                          const RunContext& context) const;
+    std::vector<flg_transform> transforms(std::span<const Vec3f> driver_positions, std::span<const Mat3f> gradients,
+                                          const RunContext& context) const;
     float output_scale() const;
 
 private:

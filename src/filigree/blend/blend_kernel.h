@@ -1,30 +1,24 @@
-// The inner loop of the blend code: records of many cells, sixteen (or eight, or four) vertices at a time.
+// The inner loops of the blend code, on all threads. They are the runtime's: runtime/rt_kernel.h.
 #pragma once
 
 #include "filigree/context.h"
 #include "filigree/mesh.h"
 
+#include "runtime/rt_kernel.h"
+
 namespace filigree::blend_kernel {
 
-/// What a driver vertex gives to every vertex it carries, in one cache line: t, the columns of A, and half its rest
-/// position (which only int16 records need).
-struct alignas(64) VertexTransform {
-    float t[3];
-    float a[9];
-    float half_rest[3];
-    float unused = 0;
-};
+/// What a driver vertex gives to every vertex it carries: t, the columns of A, and half its rest position.
+using VertexTransform = flg_transform;
 
 /// Records of one cell, end to end.
-struct Run {
-    Index cell = 0, first = 0, count = 0;
-};
+using Run = flg_run;
 
 /// Arrays are padded so that 16 values can be read from any record; `runs` have at most kMaxRun records each.
-inline constexpr Index kMaxRun = 512;
-inline constexpr std::size_t kPadding = 16;
+inline constexpr Index kMaxRun = FLG_MAX_RUN;
+inline constexpr std::size_t kPadding = FLG_PADDING;
 /// Slots that are restored at a time when order is asked for: their points stay in the second-level cache.
-inline constexpr Index kBlock = 1 << 15;
+inline constexpr Index kBlock = FLG_BLOCK;
 
 /// Everything about the records that does not change from pose to pose. Per record either q or offset is filled.
 struct Records {

@@ -4,6 +4,8 @@
 #include "filigree/blend/gradient_fit.h"
 #include "filigree/mesh/normals.h"
 
+#include "runtime/rt_kernel.h"
+
 #include <mutex>
 
 namespace filigree {
@@ -28,7 +30,7 @@ struct Restorer::Content {
 namespace {
 
 std::vector<Vec3f> unit(std::vector<Vec3f> normals) {
-    for (Vec3f& n : normals) n = n.cast<double>().normalized().cast<float>();
+    for (Vec3f& n : normals) flg_unit(n.data());
     return normals;
 }
 

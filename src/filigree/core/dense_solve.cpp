@@ -2,7 +2,6 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <Eigen/QR>
 #include <Eigen/SVD>
 
@@ -63,10 +62,6 @@ Eigen::MatrixX3d least_squares(const Eigen::MatrixXd& matrix, const Eigen::Matri
 Eigen::MatrixXd orthogonal_complement(const Eigen::MatrixXd& matrix) {
     const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> split(matrix);
     return Eigen::MatrixXd(split.householderQ()).rightCols(matrix.rows() - split.rank());
-}
-
-Eigen::MatrixXd solve_general(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right) {
-    return matrix.partialPivLu().solve(right);
 }
 
 } // namespace filigree

@@ -52,7 +52,5 @@ Eigen::MatrixX3d least_squares(const Eigen::MatrixXd& matrix, const Eigen::Matri
 /// An orthonormal basis, as columns, of all that is orthogonal to the columns of matrix. It has no columns where
 /// nothing is.
 Eigen::MatrixXd orthogonal_complement(const Eigen::MatrixXd& matrix);
-/// x with matrix x = right, for any square matrix that is not singular.
-Eigen::MatrixXd solve_general(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
 
 } // namespace filigree

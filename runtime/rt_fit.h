@@ -1,0 +1,63 @@
+/* Gradients of a driver from its positions alone, as the runtime and libfiligree use it. Not part of the interface. */
+#ifndef FILIGREE_RT_FIT_H
+#define FILIGREE_RT_FIT_H
+
+#include "rt_kernel.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Where memory comes from. allocate gives NULL where there is none. */
+typedef struct flg_allocator {
+    void* (*allocate)(void* user, size_t bytes);
+    void (*release)(void* user, void* memory);
+    void* user;
+} flg_allocator;
+/* malloc and free */
+FLG_SHARED flg_allocator flg_default_allocator(void);
+/* count items of so many bytes. NULL: there is no memory, or the product is no size_t. */
+FLG_SHARED void* flg_allocate(const flg_allocator* from, uint64_t count, size_t item);
+FLG_SHARED void flg_release(const flg_allocator* to, void* memory);
+
+/* What is sorted: by key, of equal keys the lower value first. */
+typedef struct flg_key {
+    uint64_t key;
+    uint32_t value;
+} flg_key;
+/* other: scratch memory for as many. */
+FLG_SHARED void flg_sort(flg_key* keys, flg_key* other, size_t count);
+
+typedef struct flg_fit flg_fit;
+
+/* The faces of a driver. */
+typedef struct flg_faces {
+    const uint32_t* corners;
+    const uint32_t* offsets; /* count + 1, ascending; NULL: triangles */
+    size_t count;
+} flg_faces;
+
+/* Begins a fit: finds what is connected and sorts the vertices by place. rest: 3 floats a vertex, finite, copied.
+ * NULL: there is no memory. Then, for all vertices, flg_fit_solve; then flg_fit_end. */
+FLG_SHARED flg_fit* flg_fit_begin(const float* rest, uint32_t count, const flg_faces* faces, const flg_kernel* kernel,
+                                  const flg_allocator* allocator);
+/* Finds the neighbours of vertices begin to end - 1 and solves for their weights. Ranges may be solved on several
+ * threads, each with scratch memory of its own: flg_fit_scratch_bytes bytes. */
+FLG_SHARED size_t flg_fit_scratch_bytes(uint32_t count);
+FLG_SHARED void flg_fit_solve(flg_fit* fit, uint32_t begin, uint32_t end, void* scratch);
+FLG_SHARED void flg_fit_end(flg_fit* fit);
+FLG_SHARED void flg_fit_free(flg_fit* fit);
+
+/* The gradients of vertices begin to end - 1, 9 floats each, column by column. */
+FLG_SHARED void flg_fit_gradients(const flg_fit* fit, const float* positions, uint32_t begin, uint32_t end,
+                                  float* gradients);
+
+/* Unit normals, 3 floats a vertex: the sum of its faces' area vectors; zero without a face of positive area. sums: 3
+ * doubles a vertex of scratch memory. */
+FLG_SHARED void flg_vertex_normals(const float* positions, size_t count, const flg_faces* faces, double* sums,
+                                   float* normals);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
