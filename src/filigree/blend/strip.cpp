@@ -1,5 +1,6 @@
 #include "filigree/strip.h"
 
+#include "filigree/blend/bind_levels.h"
 #include "filigree/blend/blend_code.h"
 #include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"
@@ -188,16 +189,24 @@ Result<Model> bind_to_own_driver(Mesh mesh, Level driver, Precision precision, c
     if (std::optional<Error> error = check_level(mesh, driver)) return *error;
     const Result<WorkingMesh> work = make_working_mesh(mesh, context);
     if (!work) return work.error();
+    std::vector<Level> levels;
+    levels.push_back(std::move(driver));
+    return bind_to_levels(std::move(mesh), std::move(levels), *work, precision, context);
+}
+
+Result<Model> bind_to_levels(Mesh mesh, std::vector<Level> levels, const WorkingMesh& work, Precision precision,
+                             const RunContext& context) {
+    const Level& driver = levels.front();
     Cells cells = make_cells(driver);
     std::vector<Triangle> over_places = cells.global; // a driver's vertex may lie where an earlier one does
     for (Triangle& cell : over_places)
-        for (Index& v : cell) v = work->surface.representative[v];
+        for (Index& v : cell) v = work.surface.representative[v];
     const Result<Binding> binding =
-        bind_to_driver(work->positions, work->surface, work->normals, over_places, work->surface.triangles, context);
+        bind_to_driver(work.positions, work.surface, work.normals, over_places, work.surface.triangles, context);
     if (!binding) return binding.error();
     Model model;
     model.detail = encode_blend(mesh.positions, driver.vertices, std::move(cells.local), *binding, precision);
-    model.levels.push_back(std::move(driver));
+    model.levels = std::move(levels);
     model.mesh = std::move(mesh);
     split_shared_normals(model.mesh);
     return model;

@@ -1,5 +1,6 @@
 #include "filigree/pose.h"
 
+#include "filigree/blend/driver_search.h"
 #include "filigree/blend/gradient_fit.h"
 #include "filigree/blend/sampled_restorer.h"
 #include "filigree/core/math.h"
@@ -14,47 +15,7 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kMostMeasured = 65536; // vertices, where a few per cent do
-constexpr std::size_t kFirstDriver = 1000, kSmallestDriver = 12;
-constexpr double kOrder = 1.3;        // the error falls about as fast as this power of the driver's vertices grows
-constexpr double kMargin = 1.4;       // warps that are no more curved than the family's err by up to so much more
-constexpr double kCloseEnough = 1.15; // ratio of the smallest driver that passed to the largest that did not
-
-/// The next size to try: where a power law through both drivers, or of the usual order through one, meets the goal.
-class DriverSearch {
-public:
-    DriverSearch(std::size_t most, double goal) : most_(double(most)), goal_(goal) {}
-
-    std::size_t first() const { return static_cast<std::size_t>(std::min(double(kFirstDriver), most_)); }
-    void add(std::size_t size, double error) {
-        Tried& side = error <= goal_ ? passed_ : failed_;
-        side = {double(size), std::max(error, 1e-12)};
-    }
-    bool is_done() const {
-        return passed_.size > 0 &&
-               (passed_.size <= double(kSmallestDriver) || passed_.size / failed_.size < kCloseEnough);
-    }
-    std::size_t next() const {
-        double size;
-        if (passed_.size > 0 && passed_.size < most_ && failed_.size > 0) {
-            const double slope = math::log(passed_.error / failed_.error) / math::log(passed_.size / failed_.size);
-            size = failed_.size * math::pow(0.9 * goal_ / failed_.error, 1 / std::min(slope, -0.1));
-            size = std::clamp(size, failed_.size * 1.07, passed_.size / 1.07);
-        } else { // the whole mesh has no error that a power law could go through
-            const Tried& one = failed_.size > 0 ? failed_ : passed_;
-            size = one.size * std::clamp(math::pow(one.error / (0.8 * goal_), 1 / kOrder), 0.1, 10.0);
-            if (failed_.size > 0) size = std::max(size, failed_.size * 1.3);
-            if (passed_.size > 0) size = std::min(size, passed_.size / (failed_.size > 0 ? 1.07 : 1.3));
-        }
-        return static_cast<std::size_t>(std::clamp(std::round(size), double(kSmallestDriver), most_));
-    }
-
-private:
-    struct Tried {
-        double size = 0, error = 0;
-    };
-    Tried passed_, failed_;
-    double most_, goal_;
-};
+constexpr double kMargin = 1.4; // warps that are no more curved than the family's err by up to so much more
 
 Status check(const StripOptions& options, const FidelityGoal& goal) {
     if (!(goal.error > 0) || !std::isfinite(goal.error))

@@ -15,6 +15,7 @@
 // never too late.
 #include "filigree/levels/edge_collapse.h"
 
+#include "filigree/core/disjoint_sets.h"
 #include "filigree/mesh/closest_point.h"
 #include "filigree/mesh/edges.h"
 #include "filigree/mesh/quadric.h"
@@ -30,9 +31,7 @@ namespace filigree {
 namespace {
 
 constexpr double kBorderWeight = 1; // of the planes that stand on open edges, so that outlines keep their shape
-constexpr double kLengthWeight =
-    0.02; // of (edge length)^2 x area: spreads vertices evenly; 0.001 and 0.1 restore 1.3 to 2 times worse
-constexpr double kLeastArea = 0.2; // what merges counts as this large at least, in mean areas of the driver's vertices
+constexpr double kLeastArea = 0.2;  // what merges counts as this large at least, in mean areas of the driver's vertices
 constexpr std::size_t kMostTakenDown = 32; // vertices a vertex that is left, as far as mean areas go
 constexpr double kHeightWeight = 0.3;      // of (height of what stands out)^2 x area
 constexpr double kFarthestPoint = 3;       // times the largest error: how far off a single point may be left
@@ -43,6 +42,8 @@ constexpr std::size_t kWideFan = 64;   // triangles at a vertex from which heigh
 constexpr std::size_t kFewTriangles = 8; // a list this long is no trouble even when all of it is gone
 constexpr double kHubSlack =
     1.5; // an edge of a hub may have become this much dearer since it was priced: 1.2 in distance
+constexpr double kLargePart = 0.05;          // of the diagonal: parts from here on keep vertices of their own
+constexpr std::size_t kMostKeptByParts = 16; // all parts together keep this share at most
 
 struct Collapse {
     double cost;  ///< what it is sorted by
@@ -69,9 +70,60 @@ struct TriangleList {
     }
 };
 
+/// Another shape of the mesh that is simplified.
+struct OtherShape {
+    std::vector<Vec3d> points;
+    std::vector<Quadric> quadrics;
+};
+
+} // namespace
+
+/// Writes down what happens to triangles and vertices, in local numbers; ids are given when all is done.
+class CollapseRecorder {
+public:
+    void begin(std::span<const Triangle> triangles, std::size_t vertices) {
+        order_.triangles_.assign(triangles.begin(), triangles.end());
+        order_.gone_at_.assign(triangles.size(), kNoIndex);
+        order_.merged_into_.assign(vertices, kNoIndex);
+        order_.merged_at_.assign(vertices, kNoIndex);
+        add_step(vertices, 0, 0);
+    }
+    void remove(Index triangle) { order_.gone_at_[triangle] = step(); }
+    void merge(Index from, Index to) {
+        order_.merged_into_[from] = to;
+        order_.merged_at_[from] = step();
+    }
+    void add_step(std::size_t vertices, double error, std::size_t forced) {
+        order_.counts_.push_back(vertices);
+        order_.errors_.push_back(error);
+        order_.forced_.push_back(forced);
+    }
+    /// source: the id of each local vertex; count: of ids.
+    CollapseOrder take(std::span<const Index> source, std::size_t count) {
+        std::vector<Index> into(count, kNoIndex), at(count, kNoIndex);
+        for (std::size_t v = 0; v < source.size(); ++v) {
+            if (order_.merged_into_[v] == kNoIndex) continue;
+            into[source[v]] = source[order_.merged_into_[v]];
+            at[source[v]] = order_.merged_at_[v];
+        }
+        order_.merged_into_ = std::move(into);
+        order_.merged_at_ = std::move(at);
+        for (Triangle& t : order_.triangles_)
+            for (Index& v : t) v = source[v];
+        return std::move(order_);
+    }
+
+private:
+    Index step() const { return static_cast<Index>(order_.counts_.size()); } ///< the one that is going on
+    CollapseOrder order_;
+};
+
+namespace {
+
 class Collapser {
 public:
-    Collapser(std::span<const Vec3f> positions, std::span<const Triangle> triangles) {
+    Collapser(std::span<const Vec3f> positions, std::span<const Triangle> triangles, const EdgeCollapseOptions& options)
+        : ids_(positions.size()), length_weight_(options.length_weight) {
         std::vector<Index> local(positions.size(), kNoIndex);
         for (const Triangle& t : triangles)
             for (Index v : t) local[v] = 0;
@@ -93,7 +145,14 @@ public:
         was_hub_.assign(points_.size(), false);
         vertex_count_ = points_.size();
         triangle_count_ = triangles_.size();
-        make_quadrics();
+        quadrics_ = quadrics_of(points_);
+        for (const std::vector<Vec3f>& shape : options.other_shapes) {
+            OtherShape& other = others_.emplace_back();
+            for (const Index v : source_) other.points.push_back(shape[v].cast<double>());
+            other.quadrics = quadrics_of(other.points);
+        }
+        if (options.least_of_part > 0) find_parts(options.least_of_part);
+        record_.begin(triangles_, points_.size());
     }
 
     void run(const EdgeCollapseOptions& options, const RunContext& context) {
@@ -107,6 +166,7 @@ public:
             queue_.pop();
             if (next.stamp != stamp_of(next.from, next.to) && !renew(next)) continue;
             if (shared_triangles(next.from, next.to) == triangle_count_) continue; // something has to be left
+            if (!may_lose_vertices(next.from)) continue;
             if (options.max_edge && stretches(next.from, next.to, *options.max_edge)) continue;
             if (!next.forced && !is_clean(next.from, next.to)) {
                 queue_.push(forced(next));
@@ -119,8 +179,11 @@ public:
             error_ = std::max(error_, distance);
             forced_ += next.forced;
             apply(next.from, next.to);
+            record_.add_step(vertex_count_, error_, forced_);
         }
     }
+
+    CollapseOrder order() { return record_.take(source_, ids_); }
 
     EdgeCollapseResult result() const {
         EdgeCollapseResult result;
@@ -133,21 +196,22 @@ public:
     }
 
 private:
-    Vec3d normal(const Triangle& t) const { // twice the area long
-        return (points_[t[1]] - points_[t[0]]).cross(points_[t[2]] - points_[t[0]]);
+    static Vec3d normal(const Triangle& t, std::span<const Vec3d> points) { // twice the area long
+        return (points[t[1]] - points[t[0]]).cross(points[t[2]] - points[t[0]]);
     }
+    Vec3d normal(const Triangle& t) const { return normal(t, points_); }
 
-    void make_quadrics() {
-        quadrics_.resize(points_.size());
+    std::vector<Quadric> quadrics_of(std::span<const Vec3d> points) const {
+        std::vector<Quadric> quadrics(points.size());
         std::vector<bool> is_open(3 * triangles_.size(), true); // half-edges of edges that have not two triangles
         for (const std::span<const Index> edge : edges_of(triangles_, points_.size()))
             for (const Index h : edge) is_open[h] = edge.size() != 2;
         for (Index t = 0; t < triangles_.size(); ++t) {
-            const Vec3d n = normal(triangles_[t]);
+            const Vec3d n = normal(triangles_[t], points);
             const double area = 0.5 * n.norm();
             for (int k = 0; k < 3; ++k) {
-                Quadric& quadric = quadrics_[triangles_[t][k]];
-                if (area > 0) quadric.add_plane(n.normalized(), points_[triangles_[t][k]], area / 3);
+                Quadric& quadric = quadrics[triangles_[t][k]];
+                if (area > 0) quadric.add_plane(n.normalized(), points[triangles_[t][k]], area / 3);
                 quadric.area += area / 3;
             }
         }
@@ -155,12 +219,45 @@ private:
             for (int k = 0; k < 3; ++k) {
                 if (!is_open[3 * t + Index(k)]) continue;
                 const Index a = triangles_[t][k], b = triangles_[t][(k + 1) % 3];
-                const Vec3d along = points_[b] - points_[a];
-                const Vec3d side = along.cross(normal(triangles_[t]));
+                const Vec3d along = points[b] - points[a];
+                const Vec3d side = along.cross(normal(triangles_[t], points));
                 if (side.squaredNorm() == 0) continue;
                 for (Index v : {a, b})
-                    quadrics_[v].add_plane(side.normalized(), points_[a], kBorderWeight * along.squaredNorm() / 2);
+                    quadrics[v].add_plane(side.normalized(), points[a], kBorderWeight * along.squaredNorm() / 2);
             }
+        return quadrics;
+    }
+
+    /// Which vertices edges connect, and how many a part may not go below.
+    void find_parts(std::size_t least) {
+        DisjointSets sets(points_.size());
+        for (const Triangle& t : triangles_)
+            for (const std::size_t k : {std::size_t{1}, std::size_t{2}}) sets.join(t[0], t[k]);
+        part_.resize(points_.size());
+        std::vector<Box> boxes(points_.size());
+        left_of_part_.assign(points_.size(), 0);
+        Box whole;
+        for (Index v = 0; v < points_.size(); ++v) {
+            part_[v] = sets.root(v);
+            boxes[part_[v]].extend(points_[v]);
+            whole.extend(points_[v]);
+            ++left_of_part_[part_[v]];
+        }
+        std::vector<Index> large;
+        for (Index v = 0; v < points_.size(); ++v)
+            if (part_[v] == v && boxes[v].diagonal() >= kLargePart * whole.diagonal()) large.push_back(v);
+        least_of_part_.assign(points_.size(), 0);
+        if (large.size() < 2) return;
+        for (const Index v : large)
+            least_of_part_[v] = std::min(least, points_.size() / (kMostKeptByParts * large.size()));
+    }
+    bool may_lose_vertices(Index v) const {
+        return part_.empty() || left_of_part_[part_[v]] > least_of_part_[part_[v]];
+    }
+    /// A vertex lost its last triangle (-1), or got its first one (1).
+    void count_vertex(Index v, int change) {
+        vertex_count_ += static_cast<std::size_t>(change);
+        if (!part_.empty()) left_of_part_[part_[v]] += static_cast<std::size_t>(change);
     }
 
     std::vector<Index> neighbours_of(Index v) const {
@@ -180,11 +277,17 @@ private:
     Index stamp_of(Index from, Index to) const { return stamp_[from] + stamp_[to]; }
 
     Collapse priced(Index from, Index to) const {
-        const double along = (points_[to] - points_[from]).squaredNorm();
-        const double error = quadrics_[from].at(points_[to]) + quadrics_[to].at(points_[to]);
+        double along = (points_[to] - points_[from]).squaredNorm();
+        double error = quadrics_[from].at(points_[to]) + quadrics_[to].at(points_[to]);
+        for (const auto& [points, quadrics] : others_) {
+            along += (points[to] - points[from]).squaredNorm();
+            error += quadrics[from].at(points[to]) + quadrics[to].at(points[to]);
+        }
+        along /= double(1 + others_.size());
+        error /= double(1 + others_.size());
         const double area = quadrics_[from].area + quadrics_[to].area;
         const double counted = area > 0 ? error * std::max(1.0, least_area_ / area) : error;
-        const double cost = counted + kLengthWeight * along * counted_area(from);
+        const double cost = counted + length_weight_ * along * counted_area(from);
         return {cost, error, from, to, stamp_of(from, to), false};
     }
     double counted_area(Index v) const { return std::max(quadrics_[v].area, least_area_); }
@@ -320,9 +423,10 @@ private:
 
     void remove(Index triangle) {
         const Triangle corners = std::exchange(triangles_[triangle], {kNoIndex, kNoIndex, kNoIndex});
+        record_.remove(triangle);
         for (Index v : corners) {
             TriangleList& around = around_[v];
-            vertex_count_ -= --around.left == 0;
+            if (--around.left == 0) count_vertex(v, -1);
             if (around.all.size() > 2 * around.left + kFewTriangles)
                 std::erase_if(around.all, [&](Index t) { return !is_left(t); });
         }
@@ -333,8 +437,11 @@ private:
         const std::vector<Index> ring = around_[from].all;
         for (Index t : ring)
             if (has(triangles_[t], to)) remove(t);
-        vertex_count_ += around_[to].left == 0 && around_[from].left > 0; // it had lost its last one, and gets new ones
-        vertex_count_ -= around_[from].left > 0;
+        if (around_[from].left > 0) {
+            if (around_[to].left == 0) count_vertex(to, 1); // it had lost its last one, and gets new ones
+            count_vertex(from, -1);
+        }
+        record_.merge(from, to);
         std::vector<Index> moved;
         for (Index t : ring)
             if (is_left(t)) moved.push_back(t);
@@ -344,6 +451,7 @@ private:
         }
         around_[from] = {};
         quadrics_[to] += quadrics_[from];
+        for (OtherShape& other : others_) other.quadrics[to] += other.quadrics[from];
         remember_height(from, to);
         ++stamp_[from];
         ++stamp_[to];
@@ -411,8 +519,14 @@ private:
         }
     }
 
+    std::size_t ids_; ///< number of the caller's vertices
+    double length_weight_;
     std::vector<Vec3d> points_;
-    std::vector<Index> source_;
+    std::vector<Index> source_; ///< the caller's vertex of each
+    std::vector<OtherShape> others_;
+    std::vector<Index> part_;                               ///< of each vertex; empty: parts do not matter
+    std::vector<std::size_t> left_of_part_, least_of_part_; ///< by the part's number
+    CollapseRecorder record_;
     std::vector<Triangle> triangles_; ///< removed: kNoIndex
     std::vector<TriangleList> around_;
     std::vector<Quadric> quadrics_;
@@ -427,11 +541,37 @@ private:
 
 } // namespace
 
+Index CollapseOrder::resolve(Index vertex, Index step) const {
+    while (merged_into_[vertex] != kNoIndex && merged_at_[vertex] <= step) vertex = merged_into_[vertex];
+    return vertex;
+}
+
+EdgeCollapseResult CollapseOrder::at(std::size_t target_vertices) const {
+    Index step = 0;
+    while (step + 1 < counts_.size() && counts_[step] > target_vertices) ++step;
+    EdgeCollapseResult result;
+    for (std::size_t t = 0; t < triangles_.size(); ++t)
+        if (gone_at_[t] > step)
+            result.triangles.push_back(
+                {resolve(triangles_[t][0], step), resolve(triangles_[t][1], step), resolve(triangles_[t][2], step)});
+    result.vertex_count = counts_[step];
+    result.error = errors_[step];
+    result.forced = forced_[step];
+    return result;
+}
+
 EdgeCollapseResult collapse_edges(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
                                   const EdgeCollapseOptions& options, const RunContext& context) {
-    Collapser collapser(positions, triangles);
+    Collapser collapser(positions, triangles, options);
     collapser.run(options, context);
     return collapser.result();
+}
+
+CollapseOrder order_collapses(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
+                              const EdgeCollapseOptions& options, const RunContext& context) {
+    Collapser collapser(positions, triangles, options);
+    collapser.run(options, context);
+    return collapser.order();
 }
 
 } // namespace filigree

@@ -5,6 +5,7 @@
 #include "filigree/levels/simplify.h"
 #include "filigree/mesh/morton.h"
 #include "filigree/mesh/normals.h"
+#include "filigree/mesh/weld.h"
 
 #include <algorithm>
 #include <unordered_map>
@@ -19,25 +20,6 @@ constexpr double kLevelFactor = 4; // vertices of a level as a multiple of the n
 std::size_t default_base(std::size_t vertices) {
     if (vertices >= 20'000) return 1'000;
     return std::min(vertices, std::max<std::size_t>(50, vertices / 20));
-}
-
-Level make_level(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
-    Level level;
-    std::vector<Index> local(vertex_count, kNoIndex);
-    for (const Triangle& t : triangles)
-        for (Index v : t) local[v] = 0;
-    for (Index v = 0; v < vertex_count; ++v)
-        if (local[v] == 0) {
-            local[v] = static_cast<Index>(level.vertices.size());
-            level.vertices.push_back(v);
-        }
-    level.corners.reserve(triangles.size() * 3);
-    level.face_offsets.reserve(triangles.size() + 1);
-    for (const Triangle& t : triangles) {
-        for (Index v : t) level.corners.push_back(local[v]);
-        level.face_offsets.push_back(static_cast<Index>(level.corners.size()));
-    }
-    return level;
 }
 
 /// A driver for a mesh without a triangle: distinct points of it, evenly spread over their numbers, and no faces.
@@ -198,7 +180,30 @@ void spread_to_rest(const WorkingMesh& work, std::vector<Index>& nearest) {
 
 } // namespace
 
+Level make_level(std::span<const Triangle> triangles, std::size_t vertex_count) {
+    Level level;
+    std::vector<Index> local(vertex_count, kNoIndex);
+    for (const Triangle& t : triangles)
+        for (Index v : t) local[v] = 0;
+    for (Index v = 0; v < vertex_count; ++v)
+        if (local[v] == 0) {
+            local[v] = static_cast<Index>(level.vertices.size());
+            level.vertices.push_back(v);
+        }
+    level.corners.reserve(triangles.size() * 3);
+    level.face_offsets.reserve(triangles.size() + 1);
+    for (const Triangle& t : triangles) {
+        for (Index v : t) level.corners.push_back(local[v]);
+        level.face_offsets.push_back(static_cast<Index>(level.corners.size()));
+    }
+    return level;
+}
+
 Result<WorkingMesh> make_working_mesh(const Mesh& mesh, const RunContext& context) {
+    return make_working_mesh(mesh, weld_map(mesh.positions), context);
+}
+
+Result<WorkingMesh> make_working_mesh(const Mesh& mesh, std::vector<Index> representative, const RunContext& context) {
     WorkingMesh work;
     const Box box = bounds(mesh);
     const double diagonal = box.diagonal();
@@ -209,7 +214,7 @@ Result<WorkingMesh> make_working_mesh(const Mesh& mesh, const RunContext& contex
                                 .cwiseMin(kFarthest)
                                 .cwiseMax(-kFarthest)
                                 .cast<float>();
-    Result<Surface> surface = make_surface(mesh, context);
+    Result<Surface> surface = make_surface(mesh, std::move(representative), context);
     if (!surface) return surface.error();
     work.surface = std::move(*surface);
     work.normals = vertex_normals(work.surface.triangles, work.positions, context);

@@ -18,6 +18,11 @@ struct WorkingMesh {
 
 /// Errors: as of make_surface.
 Result<WorkingMesh> make_working_mesh(const Mesh& mesh, const RunContext& context);
+/// The same with vertices welded as `representative` says (mesh/surface.h).
+Result<WorkingMesh> make_working_mesh(const Mesh& mesh, std::vector<Index> representative, const RunContext& context);
+
+/// Triangles over the vertices of a mesh as a level of it.
+Level make_level(std::span<const Triangle> triangles, std::size_t vertex_count);
 
 /// The levels, coarse to fine, each simplified from the next finer one. Of a large mesh the first ones are made in
 /// clusters, and what those left is one piece.

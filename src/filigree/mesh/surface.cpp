@@ -6,9 +6,13 @@
 namespace filigree {
 
 Result<Surface> make_surface(const Mesh& mesh, const RunContext& context) {
+    return make_surface(mesh, weld_map(mesh.positions), context);
+}
+
+Result<Surface> make_surface(const Mesh& mesh, std::vector<Index> representative, const RunContext& context) {
     if (std::optional<Error> error = mesh_error(mesh)) return *error;
     Surface surface;
-    surface.representative = weld_map(mesh.positions);
+    surface.representative = std::move(representative);
     for (Index v = 0; v < surface.vertex_count(); ++v) surface.place_count += surface.representative[v] == v;
 
     Result<Triangulation> triangulation = triangulate(mesh, context);

@@ -22,5 +22,7 @@ struct Surface {
 /// Errors: usage (check_mesh refuses the mesh), unsuitable (more triangles than kMostListedTriangles, see
 /// mesh/edges.h), cancelled.
 Result<Surface> make_surface(const Mesh& mesh, const RunContext& context);
+/// The same with vertices welded as `representative` says: of each vertex the lowest that is one with it.
+Result<Surface> make_surface(const Mesh& mesh, std::vector<Index> representative, const RunContext& context);
 
 } // namespace filigree

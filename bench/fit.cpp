@@ -1,0 +1,163 @@
+// Fits animations made by formulas: the smallest driver for an error, what is left of it, and what it costs.
+//   fit_table [--error 1e-4] [--base N] [--choice rest|motion] [--frames 60] [--scan MESH] [--threads N] [NAME...]
+// A line each. Names: flag, rod, crumple, skin, bulges, fluid; scan-skin, scan-bulges and scan-warp move --scan MESH
+// (scan-warp bends, twists and distorts it; from a .pc2 file, as large scans are). Default: all.
+//   fit_table --write FOLDER NAME...    writes NAME.pc2 and NAME.obj there instead
+#include "../tests/fit/made_animations.h"
+
+#include "filigree/fit.h"
+#include "filigree/pack.h"
+#include "filigree/pose.h"
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+namespace {
+
+using namespace filigree;
+using namespace filigree_test;
+namespace fs = std::filesystem;
+
+struct Options {
+    FitOptions fit;
+    std::size_t frames = 60;
+    unsigned threads = 0;
+    std::string scan, folder;
+    std::vector<std::string> names;
+};
+
+Options read_options(int count, char** arguments) {
+    Options options;
+    for (int a = 1; a < count; ++a) {
+        const std::string name = arguments[a];
+        if (!name.starts_with("--")) {
+            options.names.push_back(name);
+            continue;
+        }
+        const std::string value = a + 1 < count ? arguments[++a] : "";
+        if (name == "--error") options.fit.error = std::atof(value.c_str());
+        if (name == "--max-error") options.fit.max_error = std::atof(value.c_str());
+        if (name == "--base") options.fit.base = std::size_t(std::atol(value.c_str()));
+        if (name == "--frames") options.frames = std::size_t(std::atol(value.c_str()));
+        if (name == "--threads") options.threads = unsigned(std::atoi(value.c_str()));
+        if (name == "--scan") options.scan = value;
+        if (name == "--write") options.folder = value;
+        if (name == "--choice")
+            for (const DriverChoice choice : {DriverChoice::rest, DriverChoice::motion})
+                if (name_of(choice) == value) options.fit.choice = choice;
+    }
+    if (options.names.empty()) options.names = {"flag", "rod", "crumple", "skin", "bulges", "fluid"};
+    return options;
+}
+
+/// A scan that is bent, twisted and distorted.
+MadeAnimation warped(Mesh mesh, std::size_t frames) {
+    const Box box = world_bounds(mesh);
+    return animate(mesh, frames, [=](std::size_t frame) {
+        const double s = std::sin(std::numbers::pi * double(frame) / double(frames)) + 1e-4;
+        const auto bend = make_bend(box, Axis::x, 100 * s), twist = make_twist(box, Axis::x, 90 * s);
+        const auto random = make_smooth_random(box, 0.1 * s, 1);
+        std::vector<Vec3d> moved;
+        for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
+            moved.push_back(random->position(twist->position(bend->position(mesh.world_position(v)))) - mesh.origin);
+        return moved;
+    });
+}
+
+std::optional<MadeAnimation> make(const std::string& name, const Options& options) {
+    const std::size_t frames = options.frames;
+    if (name == "flag") return flag(250, 166, frames);
+    if (name == "rod") return rod_in_tube(160, 150, frames);
+    if (name == "crumple") return crumple(240, 160, std::min<std::size_t>(frames, 30));
+    if (name == "skin") return skinned(make_shape("wavy-sphere", {.resolution = 84}).value(), 18, frames);
+    if (name == "bulges") return bulges(make_shape("wavy-sphere", {.resolution = 84}).value(), 24, frames);
+    if (name == "fluid")
+        return fluid(make_shape("wavy-sphere", {.resolution = 90}).value(), std::min<std::size_t>(frames, 30));
+    if (options.scan.empty()) return std::nullopt;
+    Mesh scan = read_mesh(options.scan).value().mesh;
+    if (name == "scan-skin") return skinned(std::move(scan), 18, frames);
+    if (name == "scan-bulges") return bulges(std::move(scan), 24, frames);
+    if (name == "scan-warp") return warped(std::move(scan), frames);
+    return std::nullopt;
+}
+
+struct Spent {
+    double wall = 0, processor = 0; ///< s
+};
+Spent now() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    const auto seconds = [](const timeval& t) { return double(t.tv_sec) + 1e-6 * double(t.tv_usec); };
+    return {std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(),
+            seconds(usage.ru_utime) + seconds(usage.ru_stime)};
+}
+double peak_megabytes() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return double(usage.ru_maxrss) / 1024;
+}
+
+double kilobytes(const fs::path& path) { return double(fs::file_size(path)) / 1000; }
+
+void write(const MadeAnimation& made, const std::string& name, const fs::path& folder) {
+    fs::create_directories(folder);
+    for (const Status& status :
+         {write_mesh(*made.rest, folder / (name + ".obj")).ok() ? Status(Success{}) : Error{},
+          write_animation(made.animation, folder / (name + ".pc2")).ok() ? Status(Success{}) : Error{}})
+        if (!status) std::exit(1);
+}
+
+void run(const std::string& name, const Options& options) {
+    const std::optional<MadeAnimation> made = make(name, options);
+    if (!made) {
+        std::printf("%-12s needs --scan MESH, or is not known\n", name.c_str());
+        return;
+    }
+    if (!options.folder.empty()) return write(*made, name, options.folder);
+    const fs::path folder = fs::temp_directory_path() / ("fit_table_" + std::to_string(::getpid()));
+    fs::create_directories(folder);
+    const fs::path cache = folder / "cache.pc2";
+    (void)write_animation(made->animation, cache).value();
+    const Mesh rest = *made->rest;
+    const MeshAnimation animation = open_animation(cache, rest).value();
+    const RunContext context(options.threads);
+    const Spent begin = now();
+    const Result<Fitted> fitted = fit_animation(animation, options.fit, context);
+    const Spent end = now();
+    if (fitted) {
+        const FitReport& report = fitted->report;
+        const fs::path packed = folder / "packed.fil", glb = folder / "skin.glb";
+        const unsigned bits = options.fit.error < 9e-5 ? 16 : 14;
+        (void)pack_model(fitted->model, fitted->poses, {.bits = bits}, packed).value();
+        (void)write_skin_glb(fitted->model, frames_of(fitted->poses), {.compress = true}, glb).value();
+        std::printf(
+            "%-12s %8zu x %-4zu %-6s %6zu  %8.2e %8.2e  %5.2f %5.2f  %9.0f %8.0f %8.0f  %5.0f  %2zu  %6.1f %6.1f "
+            "%5.0f\n",
+            name.c_str(), report.vertices, report.frames, std::string(name_of(report.choice)).c_str(),
+            report.driver_vertices, report.rms, report.max, report.normal_mean_deg, report.normal_p95_deg,
+            kilobytes(cache), kilobytes(glb), kilobytes(packed), kilobytes(cache) / kilobytes(packed), report.tries,
+            end.wall - begin.wall, end.processor - begin.processor, peak_megabytes());
+    } else {
+        std::printf("%-12s %s (%.1f s)\n", name.c_str(), fitted.error().message.c_str(), end.wall - begin.wall);
+    }
+    std::fflush(stdout);
+    fs::remove_all(folder);
+}
+
+} // namespace
+
+int main(int count, char** arguments) {
+    const Options options = read_options(count, arguments);
+    if (options.folder.empty())
+        std::printf("%-12s %8s   %-4s %-6s %6s  %8s %8s  %5s %5s  %9s %8s %8s  %5s  %2s  %6s %6s %5s\n", "animation",
+                    "vertices", "fr.", "choice", "driver", "rms", "max", "n.avg", "n.p95", "PC2 kB", "GLB kB", "packed",
+                    "times", "#", "s", "cpu s", "MB");
+    for (const std::string& name : options.names) run(name, options);
+}
