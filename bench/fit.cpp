@@ -76,10 +76,9 @@ std::optional<MadeAnimation> make(const std::string& name, const Options& option
     if (name == "flag") return flag(250, 166, frames);
     if (name == "rod") return rod_in_tube(160, 150, frames);
     if (name == "crumple") return crumple(240, 160, std::min<std::size_t>(frames, 30));
-    if (name == "skin") return skinned(make_shape("wavy-sphere", {.resolution = 84}).value(), 18, frames);
-    if (name == "bulges") return bulges(make_shape("wavy-sphere", {.resolution = 84}).value(), 24, frames);
-    if (name == "fluid")
-        return fluid(make_shape("wavy-sphere", {.resolution = 90}).value(), std::min<std::size_t>(frames, 30));
+    if (name == "skin") return skinned(wavy_sphere(84), 18, frames);
+    if (name == "bulges") return bulges(wavy_sphere(84), 24, frames);
+    if (name == "fluid") return fluid(wavy_sphere(90), std::min<std::size_t>(frames, 30));
     if (options.scan.empty()) return std::nullopt;
     Mesh scan = read_mesh(options.scan).value().mesh;
     if (name == "scan-skin") return skinned(std::move(scan), 18, frames);

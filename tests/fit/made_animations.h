@@ -51,6 +51,10 @@ inline std::vector<Vec3d> places_of(const Mesh& mesh) {
     return places;
 }
 
+inline Mesh wavy_sphere(unsigned resolution) {
+    return filigree::make_shape("wavy-sphere", {.resolution = resolution}).value();
+}
+
 /// A sheet of 1.5 x 1 in the plane of x and y, of two triangles a quad.
 inline Mesh sheet(std::size_t columns, std::size_t rows) {
     Mesh mesh;

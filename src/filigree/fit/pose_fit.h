@@ -19,6 +19,8 @@ struct PoseFitOptions {
     double prior = 1e-3;
     /// Weight of the positions' prior beside it: large numbers hold positions where the animation has them.
     double hold = 1e-3;
+    /// Whether to go on without the prior as long as the animation is followed clearly better.
+    bool refine = true;
 };
 
 /// Restoring is linear in the driver's positions and gradients, p' = sum b_i [c_i' + A_i d_i] with d_i = p - (m +
