@@ -23,6 +23,7 @@ Command sample_command();
 Command simulate_command();
 Command sweep_command();
 Command export_command();
+Command fit_command();
 Command figures_command();
 /// Those of them that do nothing but draw: none in a program that is built without the renderer.
 std::vector<Command> drawing_commands();
@@ -31,7 +32,7 @@ inline std::vector<Command> all_commands() {
     std::vector<Command> commands = {
         make_command(),    info_command(),     remesh_command(), strip_command(),  level_command(),  deform_command(),
         restore_command(), compare_command(),  bench_command(),  demo_command(),   sample_command(), simulate_command(),
-        export_command(),  fracture_command(), pack_command(),   unpack_command(), sweep_command()};
+        export_command(),  fracture_command(), pack_command(),   unpack_command(), sweep_command(),  fit_command()};
     for (Command& command : drawing_commands()) commands.push_back(std::move(command));
     return commands;
 }

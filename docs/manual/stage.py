@@ -19,7 +19,7 @@ import python_reference
 PARTS = {
     "Tutorials": ["tutorials/README"],
     "First steps": ["command-line", "python", "blender", "studio", "gallery"],
-    "Guides": ["blend-code", "packing", "handles", "bodies", "bodies-theory", "scenes", "fracture", "melting", "remesh", "inside-points", "rendering", "exchange", "cluster", "web"],
+    "Guides": ["blend-code", "fitting", "packing", "handles", "bodies", "bodies-theory", "scenes", "fracture", "melting", "remesh", "inside-points", "rendering", "exchange", "cluster", "web"],
     "File formats": ["formats", "animations", "fil-format"],
     "How it works": ["reference-code", "figures", "benchmarks", "reliability", "conventions", "architecture", "decisions/README", "contributing", "dependencies", "releasing"],
 }

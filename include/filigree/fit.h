@@ -62,6 +62,18 @@ struct Fitted {
     FitReport report;
 };
 
+/// How far a model's poses are from an animation of its mesh, over all vertices and frames.
+struct AnimationError {
+    double rms = 0, max = 0; ///< model units
+    std::size_t max_frame = 0;
+    Index max_vertex = kNoIndex; ///< of the model
+};
+/// Restores every pose and measures it against the animation's frame of the same number. order: vertex i of the model
+/// is vertex order[i] of the animation; empty: the same. Cost O(V) a frame. Errors: mismatch (another number of
+/// vertices or frames), cancelled, and those of the animation.
+Result<AnimationError> animation_error(const Model& model, const PoseSequence& poses, const MeshAnimation& animation,
+                                       std::span<const Index> order = {}, const RunContext& context = RunContext());
+
 /// Finds the smallest driver whose restored mesh follows an animation within an error, and its poses by least squares.
 /// The mesh of the model is the animation's, at rest, and keeps its order. The error is measured on every vertex of
 /// every frame as Restorer gives it. A driver has 20,000 vertices at most, and a quarter of the mesh's (64 where the

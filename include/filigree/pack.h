@@ -23,6 +23,8 @@ struct PackOptions {
     bool surface = false;
     bool keep_order = false; ///< vertices, faces and first corners keep their order
     bool levels = false;     ///< coarse to fine: every beginning of the file is a mesh
+    /// How far restored vertices may be off through poses, fraction of the diagonal (rms); above 0.
+    double clip_error = 1e-5;
     bool operator==(const PackOptions&) const = default;
 };
 
@@ -53,6 +55,8 @@ struct PackReport {
     double rms = 0, largest = 0; ///< distance of vertices from where they were, model units
     /// Vertices without a face, more than four boxes away from the others: they come back nearer.
     std::size_t out_of_reach = 0;
+    /// Vertex i of the model that is read back is vertex vertex_order[i] of this one. Empty: the order is the same.
+    std::vector<Index> vertex_order = {};
     PackedBytes bytes;
     /// The texture coordinates, colours and materials of a stream come with its last byte, as there are too many seams.
     bool lacks_level_attributes = false;
@@ -60,10 +64,10 @@ struct PackReport {
 
 /// Writes a model in few bytes (docs/packing.md). Positions are rounded; vertices and faces get an order of their own
 /// unless PackOptions::keep_order. The driver keeps its vertices and their order, so poses fit as before. Poses are
-/// packed too: 1e-5 of the diagonal (rms), gradients 1e-3. Levels between the driver and the mesh are dropped; reading
-/// binds the vertices anew. poses: may be empty. Cost O(size log size), about 0.6 processor seconds a million vertices.
-/// Errors: usage (bits), unsuitable (no vertices; a stream of a driver made elsewhere), mismatch (a pose of another
-/// number of vertices), unwritable, out_of_memory, cancelled.
+/// packed too, within PackOptions::clip_error (gradients 100 times that). Levels between the driver and the mesh are
+/// dropped; reading binds the vertices anew. poses: may be empty. Cost O(size log size), about 0.6 processor seconds a
+/// million vertices. Errors: usage (bits, clip_error), unsuitable (no vertices; a stream of a driver made elsewhere),
+/// mismatch (a pose of another number of vertices), unwritable, out_of_memory, cancelled.
 Result<PackReport> pack_model(const Model& model, const PoseSequence& poses, const PackOptions& options,
                               const std::filesystem::path& path, const RunContext& context = RunContext());
 

@@ -636,6 +636,18 @@ def export(
     threads: int = 0,
     progress: _Progress | None = None,
 ) -> _Report: ...
+def fit(
+    mesh: _MeshLike,
+    positions: ArrayLike,
+    *,
+    error: float = 0.0001,
+    max_error: float | None = None,
+    base: int | None = None,
+    rest_frame: int | str | None = None,
+    frames_per_second: float = 60.0,
+    threads: int = 0,
+    progress: _Progress | None = None,
+) -> tuple[Model, PoseSequence]: ...
 def fracture(
     mesh: _MeshLike,
     pieces: int = 20,

@@ -1,5 +1,7 @@
 #include "filigree/blend/driver_search.h"
 
+#include "filigree/core/math.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -27,12 +29,12 @@ bool DriverSearch::is_done() const {
 std::size_t DriverSearch::next() const {
     double size;
     if (passed_.size > 0 && passed_.size < most_ && failed_.size > 0) {
-        const double slope = std::log(passed_.error / failed_.error) / std::log(passed_.size / failed_.size);
-        size = failed_.size * std::pow(0.9 * goal_ / failed_.error, 1 / std::min(slope, -0.1));
+        const double slope = math::log(passed_.error / failed_.error) / math::log(passed_.size / failed_.size);
+        size = failed_.size * math::pow(0.9 * goal_ / failed_.error, 1 / std::min(slope, -0.1));
         size = std::clamp(size, failed_.size * 1.07, passed_.size / 1.07);
     } else { // the whole mesh has no error that a power law could go through
         const Tried& one = failed_.size > 0 ? failed_ : passed_;
-        size = one.size * std::clamp(std::pow(one.error / (0.8 * goal_), 1 / kOrder), 0.1, 10.0);
+        size = one.size * std::clamp(math::pow(one.error / (0.8 * goal_), 1 / kOrder), 0.1, 10.0);
         if (failed_.size > 0) size = std::max(size, failed_.size * 1.3);
         if (passed_.size > 0) size = std::min(size, passed_.size / (failed_.size > 0 ? 1.07 : 1.3));
     }

@@ -1,5 +1,6 @@
 #include "filigree/fit/animation_survey.h"
 
+#include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/parallel_sum.h"
 #include "filigree/fit.h"
@@ -241,7 +242,7 @@ Result<std::size_t> least_stretched_frame(const MeshAnimation& animation, const 
         if (context.is_cancelled()) return cancelled_error();
         if (i == 0) edges = some_edges(*animation.rest, positions);
         std::vector<double>& of_frame = logarithms.emplace_back();
-        for (const Edge& edge : edges) of_frame.push_back(std::log(std::max(length(edge, positions), 1e-30)));
+        for (const Edge& edge : edges) of_frame.push_back(math::log(std::max(length(edge, positions), 1e-30)));
     }
     std::size_t best = 0;
     double least = std::numeric_limits<double>::infinity();

@@ -2,6 +2,7 @@
 
 #include "filigree/blend/bind_levels.h"
 #include "filigree/blend/driver_search.h"
+#include "filigree/core/math.h"
 #include "filigree/fit/animation_survey.h"
 #include "filigree/fit/driver_family.h"
 #include "filigree/fit/fitted_poses.h"
@@ -77,7 +78,7 @@ struct Goal {
     double rms;                ///< model units
     std::optional<double> max; ///< model units
 
-    double score(const FramesError& error) const {
+    double score(const AnimationError& error) const {
         return max ? std::max(error.rms / rms, error.max / *max) : error.rms / rms;
     }
 };
@@ -107,7 +108,7 @@ public:
 
     struct Tried {
         std::size_t vertices; ///< that the driver has
-        FramesError error;
+        AnimationError error;
     };
     Result<Tried> try_driver(DriverChoice choice, std::size_t vertices, const RunContext& context) const {
         Level driver = family_.sample_driver(choice, vertices);
@@ -148,7 +149,7 @@ struct Known {
 /// log error over log vertices falls with this slope between two drivers.
 double slope_between(const Known& a, const Known& b) {
     if (a.vertices == b.vertices || !(a.score > 0) || !(b.score > 0)) return kUsualSlope;
-    const double slope = -std::log(b.score / a.score) / std::log(b.vertices / a.vertices);
+    const double slope = -math::log(b.score / a.score) / math::log(b.vertices / a.vertices);
     return std::clamp(slope, kLeastSlope, kMostSlope);
 }
 
@@ -169,7 +170,7 @@ private:
     Result<Fitted> fit_all(std::size_t vertices);
     Result<Fitted> search(std::size_t first);
     Status measure_normals(Fitted& fitted) const;
-    Error not_reached(const FramesError& error, std::size_t vertices, const std::string& where) const;
+    Error not_reached(const AnimationError& error, std::size_t vertices, const std::string& where) const;
     double score_of(const FitReport& report) const {
         return goal_.score({report.rms * diagonal_, report.max * diagonal_, 0, 0});
     }
@@ -313,10 +314,10 @@ Result<Fitted> FitWork::search(std::size_t first) {
         if (!is_good && size >= most_)
             return not_reached({fitted->report.rms * diagonal_, fitted->report.max * diagonal_, 0, 0}, has, "");
         if (is_good) best = *std::move(fitted);
-        double next = double(size) * std::pow(score / kAim, 1 / slope);
+        double next = double(size) * math::pow(score / kAim, 1 / slope);
         if (passed.vertices > 0 && failed.vertices > 0) {
             const double between = slope_between(failed, passed);
-            next = std::clamp(failed.vertices * std::pow(failed.score / kAim, 1 / between), failed.vertices * 1.05,
+            next = std::clamp(failed.vertices * math::pow(failed.score / kAim, 1 / between), failed.vertices * 1.05,
                               passed.vertices / 1.05);
         } else if (!is_good) {
             next = std::clamp(next, double(size) * 1.1, double(size) * 4);
@@ -350,7 +351,7 @@ Status FitWork::measure_normals(Fitted& fitted) const {
     return Success{};
 }
 
-Error FitWork::not_reached(const FramesError& error, std::size_t vertices, const std::string& where) const {
+Error FitWork::not_reached(const AnimationError& error, std::size_t vertices, const std::string& where) const {
     return unsuitable("The error is not reached: a driver of " + std::to_string(vertices) +
                       " vertices, the most that is " + "smaller than the animation itself, comes to " +
                       short_number(error.rms / diagonal_) + " of the diagonal (rms) and " +

@@ -41,8 +41,8 @@ public:
         count_ += truth.size();
     }
 
-    FramesError error() const {
-        FramesError error = error_;
+    AnimationError error() const {
+        AnimationError error = error_;
         if (count_ > 0) error.rms = std::sqrt(squared_ / double(count_));
         error.max = std::sqrt(std::max(most_, 0.0));
         return error;
@@ -51,7 +51,7 @@ public:
 private:
     double squared_ = 0, most_ = -1;
     std::size_t count_ = 0;
-    FramesError error_;
+    AnimationError error_;
 };
 
 } // namespace
@@ -80,6 +80,35 @@ Result<FittedPoses> fit_poses(const Model& model, std::size_t frames,
     context.report("fitting", 1);
     fitted.error = sum.error();
     return fitted;
+}
+
+Result<AnimationError> animation_error(const Model& model, const PoseSequence& poses, const MeshAnimation& animation,
+                                       std::span<const Index> order, const RunContext& context) {
+    const std::size_t count = model.vertex_count();
+    if (animation.rest->vertex_count() != count || (!order.empty() && order.size() != count))
+        return Error{ErrorCode::mismatch, "The animation has " + std::to_string(animation.rest->vertex_count()) +
+                                              " vertices and the model " + std::to_string(count) +
+                                              "; they are of different meshes."};
+    if (animation.frames != poses.frames.size())
+        return Error{ErrorCode::mismatch, "The animation has " + std::to_string(animation.frames) +
+                                              " frames and the model " + std::to_string(poses.frames.size()) +
+                                              " poses; they are not of one animation."};
+    RunContext silent = context;
+    silent.progress = {};
+    const Result<Restorer> restorer = Restorer::create(model, {}, silent);
+    if (!restorer) return restorer.error();
+    ErrorSum sum;
+    std::vector<Vec3f> truth(count), restored(count), ordered(order.size());
+    for (std::size_t k = 0; k < animation.frames; ++k) {
+        context.report("measuring the error", double(k) / double(animation.frames));
+        if (Status read = animation.positions(k, truth); !read) return read.error();
+        for (std::size_t v = 0; v < ordered.size(); ++v) ordered[v] = truth[order[v]];
+        if (Status done = restorer->positions(poses.frames[k], restored, silent); !done) return done.error();
+        sum.add(restored, order.empty() ? truth : ordered, k, context);
+        if (context.is_cancelled()) return cancelled_error();
+    }
+    context.report("measuring the error", 1);
+    return sum.error();
 }
 
 } // namespace filigree

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/context.h"
+#include "filigree/fit.h"
 #include "filigree/fit/pose_fit.h"
 #include "filigree/result.h"
 #include "filigree/strip.h"
@@ -12,16 +13,9 @@
 
 namespace filigree {
 
-/// Distances over vertices and frames, model units.
-struct FramesError {
-    double rms = 0, max = 0;
-    std::size_t max_frame = 0;
-    Index max_vertex = kNoIndex;
-};
-
 struct FittedPoses {
     std::vector<Pose> poses;
-    FramesError error;
+    AnimationError error;
 };
 
 /// Fits every frame, restores it, and measures it. frame(k, positions) writes the positions of frame k, one a vertex of

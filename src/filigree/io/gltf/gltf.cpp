@@ -149,6 +149,12 @@ const Mesh& GltfScene::mesh() const { return scene_->mesh; }
 const std::vector<std::string>& GltfScene::warnings() const { return scene_->warnings; }
 const std::vector<GltfAnimation>& GltfScene::animations() const { return scene_->summaries; }
 const std::vector<std::string>& GltfScene::files_beside() const { return scene_->files_beside; }
+std::size_t GltfScene::joint_count() const {
+    std::size_t count = 0;
+    for (const gltf::Skin& skin : scene_->skins) count += skin.joints.size();
+    return count;
+}
+
 const std::string& GltfScene::export_report() const { return scene_->export_report; }
 
 Status GltfScene::positions(std::size_t animation, double seconds, std::span<Vec3f> out,

@@ -49,6 +49,7 @@ public:
     const Mesh& mesh() const;
     const std::vector<std::string>& warnings() const;
     const std::vector<GltfAnimation>& animations() const;
+    std::size_t joint_count() const; ///< of its skins together
     /// Names of the files that buffers and pictures lie in, as the document has them.
     const std::vector<std::string>& files_beside() const;
 

@@ -43,6 +43,16 @@ Mesh with_driver_first(Mesh mesh, Level& driver, const RunContext& context) {
     return with_vertex_order(std::move(mesh), order, context);
 }
 
+/// The order in which a reader has the vertices: as with_driver_first makes it. coded: which vertex each coded one is.
+std::vector<Index> order_as_read(std::span<const Index> coded, std::span<const Index> driver) {
+    std::vector<bool> is_driver(coded.size());
+    std::vector<Index> order(driver.begin(), driver.end());
+    for (const Index v : driver) is_driver[v] = true;
+    for (const Index v : coded)
+        if (!is_driver[v]) order.push_back(v);
+    return order;
+}
+
 /// Whether the mesh's faces use none of the driver's vertices, though there are faces in both, and these do not stand
 /// behind the mesh's own: nothing says how the two belong together.
 bool is_driver_apart(const Model& model) {
@@ -69,7 +79,7 @@ Model bind_elsewhere(const SectionReader& in, Mesh mesh, const FileCode& code, c
     return std::move(bound->model);
 }
 
-constexpr double kClipError = 4.5e-6;   // of the diagonal: restored vertices are 1e-5 off, finer than restoring is
+constexpr double kClipShare = 0.45;     // of the error of restored vertices: that of each of a pose's numbers
 constexpr double kGradientReach = 0.01; // of the diagonal: how far vertices lie from their driver, about
 
 /// The most frames of a block, with the one at rest: as many as are 2^25 numbers, but at least 8.
@@ -104,7 +114,7 @@ PoseSequence with_gradients(const Model& model, const PoseSequence& poses, const
     return filled;
 }
 
-void code_clips(const Model& model, const PoseSequence& poses, PackedModel& coded) {
+void code_clips(const Model& model, const PoseSequence& poses, double error, PackedModel& coded) {
     const Level& driver = model.driver();
     const ClipOrder order = clip_order(driver.face_offsets, driver.corners, driver.vertices.size());
     coded.clip = {static_cast<std::uint32_t>(poses.frames.size()), poses.frames[0].gradients.empty() ? 3u : 12u};
@@ -119,7 +129,7 @@ void code_clips(const Model& model, const PoseSequence& poses, PackedModel& code
         ClipFrames frames = {rest};
         for (std::size_t f = begin; f < std::min(begin + block, poses.frames.size()); ++f)
             frames.push_back(clip_numbers(poses.frames[f].positions, poses.frames[f].gradients, numbers));
-        coded.clips.push_back(encode_clip(frames, weights, kClipError * unit, order));
+        coded.clips.push_back(encode_clip(frames, weights, kClipShare * error * unit, order));
         coded.report.bytes.clips += coded.clips.back().size();
     }
 }
@@ -171,6 +181,8 @@ std::vector<FileLevel> levels_of(const PackedMesh& coded, const Mesh& mesh, cons
 Result<PackedModel> code_model(const Model& model, const PoseSequence& poses, const PackOptions& options,
                                const RunContext& context) {
     const bool elsewhere = model.driver_is_behind;
+    if (!(options.clip_error > 0 && options.clip_error <= 1))
+        return Error{ErrorCode::usage, "clip_error must be above 0 and at most 1: it is a fraction of the diagonal."};
     if (elsewhere && options.levels)
         return Error{ErrorCode::unsuitable, "The model was stripped to a driver made elsewhere, and streams need one "
                                             "of the mesh's own vertices; the other profiles take it."};
@@ -210,7 +222,10 @@ Result<PackedModel> code_model(const Model& model, const PoseSequence& poses, co
                     .bytes = {coded.mesh.connectivity.size(), coded.mesh.places.size(), coded.mesh.attributes.size(),
                               coded.mesh.order.size(),
                               coded.driver.size() + sizeof(Vec3f) * coded.driver_positions.size()}};
-    if (!poses.empty()) code_clips(model, options.levels ? with_gradients(model, poses, context) : poses, coded);
+    if (!options.keep_order)
+        coded.report.vertex_order = elsewhere ? report.vertex : order_as_read(report.vertex, driver.vertices);
+    if (!poses.empty())
+        code_clips(model, options.levels ? with_gradients(model, poses, context) : poses, options.clip_error, coded);
     for (const PackedLevel& level : coded.mesh.levels.levels) {
         coded.report.bytes.levels += level.splits.size();
         coded.report.bytes.refinements += level.refinement.size();

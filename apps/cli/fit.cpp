@@ -1,0 +1,383 @@
+#include "animation_output.h"
+#include "commands.h"
+#include "web_page.h"
+
+#include "filigree/fit.h"
+#include "filigree/io/animation/point_cache.h"
+#include "filigree/io/animation/pose_match.h"
+#include "filigree/io/gltf/gltf.h"
+#include "filigree/io/model/model_file.h"
+#include "filigree/io/system/extension.h"
+#include "filigree/pack.h"
+
+#include <cmath>
+#include <filesystem>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace filigree::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// How a .fil is written.
+enum class FitProfile { plain, compact, stream, lossless };
+
+struct FitArguments {
+    std::string input, mesh;
+    std::vector<std::string> outputs;
+    FitOptions fit;
+    std::size_t rest = 0; ///< frame from 1; 0: not given
+    bool web = false;
+    FitProfile profile = FitProfile::plain;
+    std::optional<unsigned> bits;
+    bool keep_order = false;
+    PoseFileOptions pose_file;
+    AnimationOutput animation;
+
+    bool rounds() const { return profile == FitProfile::compact || profile == FitProfile::stream; }
+};
+
+bool is_fil_path(const std::string& path) { return lower_extension(path) == ".fil"; }
+bool is_page(const std::string& path, const FitArguments& options) {
+    return options.web && !is_fil_path(path) && require(animation_format(path)) == AnimationFormat::numbered;
+}
+
+void check(const FitArguments& options, const Session& session) {
+    for (std::size_t k = 0; k < options.outputs.size(); ++k) {
+        const std::string& path = options.outputs[k];
+        for (std::size_t before = 0; before < k; ++before)
+            if (fs::path(path).lexically_normal() == fs::path(options.outputs[before]).lexically_normal())
+                refuse(path + ": two outputs cannot go to one place.");
+        if (is_fil_path(path))
+            check_folder_of(path);
+        else
+            check_animation_path(path);
+        if (!is_page(path, options)) check_not_input(path, {options.input, options.mesh});
+    }
+    const auto none = [&](const auto& is_one) { return std::ranges::none_of(options.outputs, is_one); };
+    if (options.web && none([&](const std::string& path) { return is_page(path, options); }))
+        refuse("--web writes a folder with a page; give one with -o NAME/.");
+    const std::string packing = session.first_given({"--profile", "--bits", "--keep-order"});
+    if (!packing.empty() && none(is_fil_path)) refuse(packing + " belongs to a model file; give one with -o NAME.fil.");
+    if (const std::string given = session.first_given({"--bits", "--keep-order"}); !given.empty() && !options.rounds())
+        refuse(given + " belongs to --profile compact or stream, which round.");
+    if (options.web) return;
+    check_animation_options(options.outputs, session);
+}
+
+/// The animation that a command line means, and what it refers to. It is where it is made.
+struct Input {
+    std::optional<Model> model; ///< of a .fil
+    PoseSequence poses;
+    std::optional<Restorer> restorer;
+    Mesh rest;
+    MeshAnimation animation;
+    std::size_t joints = 0;  ///< of an animated glTF's skins
+    bool needs_rest = false; ///< no mesh at rest was given: a frame stands for it
+};
+
+/// The first mesh of a sequence, for its faces.
+Mesh first_mesh(const std::string& path, Session& session) {
+    const std::vector<fs::path> files = animation_files(path);
+    if (files.empty()) refuse(ErrorCode::not_found, path + ": has no meshes.");
+    std::vector<std::pair<std::uint64_t, fs::path>> numbered;
+    for (const fs::path& file : files) {
+        const std::string stem = file.stem().string();
+        const std::size_t digits = stem.find_last_not_of("0123456789") + 1;
+        if (digits < stem.size()) numbered.emplace_back(std::stoull(stem.substr(digits).substr(0, 18)), file);
+    }
+    return session.read_mesh((numbered.empty() ? files.front() : std::ranges::min(numbered).second).string());
+}
+
+/// A model's restored mesh as its own poses move it.
+void open_model_animation(const FitArguments& options, Session& session, Input& input) {
+    input.model = session.read_model(options.input, &input.poses);
+    if (input.poses.empty()) refuse(ErrorCode::unsuitable, options.input + ": has no poses, and so no motion to fit.");
+    input.restorer = require(Restorer::create(*input.model, {}, session.silent_context()));
+    input.rest = level_mesh(*input.model, input.model->finest_level());
+    input.animation = {&input.rest, input.poses.frames.size(),
+                       options.pose_file.frames_per_second.value_or(input.poses.frames_per_second),
+                       [&input](std::size_t frame, std::span<Vec3f> positions) {
+                           return input.restorer->positions(input.poses.frames[frame], positions);
+                       }};
+}
+
+void open_input(const FitArguments& options, Session& session, Input& input) {
+    const std::string extension = lower_extension(options.input);
+    const bool is_gltf_file = extension == ".glb" || extension == ".gltf";
+    std::error_code ignored;
+    const bool is_sequence = numbered_name(options.input) || fs::is_directory(options.input, ignored);
+    if (!is_sequence && extension == ".fil" && options.mesh.empty())
+        return open_model_animation(options, session, input);
+    PoseFileOptions file = options.pose_file;
+    std::vector<std::string> warnings;
+    if (!options.mesh.empty()) {
+        input.rest = session.read_mesh(options.mesh);
+        if (is_gltf_file || is_sequence) { // vertices may have been split or sorted on the way
+            file.rest = input.rest.positions;
+            file.warnings = &warnings;
+        }
+    } else if (is_sequence) {
+        input.rest = first_mesh(options.input, session);
+        input.needs_rest = true;
+    } else if (is_gltf_file) {
+        const GltfScene scene = require(GltfScene::read(options.input, session.context()));
+        session.warn(scene.warnings());
+        input.rest = scene.mesh();
+        input.joints = scene.joint_count();
+    } else if (extension == ".abc") {
+        refuse(ErrorCode::unsupported, options.input + ": Alembic is not read; in Blender, import it and export .pc2 "
+                                                       "(add-on NewTek MDD or PC2) or an animated .glb.");
+    } else {
+        refuse(options.input + ": has positions alone; --mesh FILE gives the mesh that it moves.");
+    }
+    input.animation = require(open_animation(options.input, input.rest, file, session.context()));
+    session.warn(warnings);
+    if (options.mesh.empty() || file.warnings || input.animation.frames == 0) return;
+    std::vector<Vec3f> first(input.rest.vertex_count()); // caches of programs with another axis up lie on their faces
+    require(input.animation.positions(0, first));
+    if (const std::string turned = turned_first_frame(input.rest.positions, first, input.rest.origin, options.input);
+        !turned.empty())
+        session.warn(turned);
+}
+
+/// Bits that round positions to a quarter of the error asked for, as far as there are so many.
+unsigned bits_for(double error, const Mesh& mesh) {
+    const Box box = world_bounds(mesh);
+    const double side = box.size().maxCoeff() / box.diagonal();
+    constexpr unsigned kFewest = 12, kMost = 16;
+    unsigned bits = kFewest;
+    while (bits < kMost && 0.5 * side / double((1u << bits) - 1) > error / 4) ++bits;
+    return bits;
+}
+
+/// What of the error is left for the fit once packing has taken its part: a quarter for places, a third for poses.
+constexpr double kShareOfPlaces = 0.25, kShareOfPoses = 1.0 / 3;
+double left_for_fit(double error) {
+    return error * std::sqrt(1 - kShareOfPlaces * kShareOfPlaces - kShareOfPoses * kShareOfPoses);
+}
+
+std::string error_text(double rms, double max, std::size_t frame, Index vertex) {
+    return fmt::format("{:.2g} of the diagonal (rms), {:.2g} at most (frame {}, vertex {})", rms, max, frame + 1,
+                       with_commas(vertex));
+}
+
+std::uint64_t bytes_at(const std::string& path) {
+    return fs::is_regular_file(path) ? std::uint64_t(fs::file_size(path)) : 0;
+}
+
+class FitOutputs {
+public:
+    FitOutputs(const FitArguments& options, const Fitted& fitted, const MeshAnimation& animation, Session& session)
+        : options_(options), fitted_(fitted), animation_(animation), session_(session),
+          cache_bytes_(std::uint64_t(fitted.report.frames) * fitted.report.vertices * sizeof(Vec3f)) {}
+
+    void write() {
+        for (const std::string& path : options_.outputs) {
+            Report one;
+            if (is_fil_path(path))
+                write_model(path, one);
+            else if (is_page(path, options_))
+                write_page(path, one);
+            else
+                write_animation_output(fitted_.model, frames_of(fitted_.poses), {}, options_.animation, path,
+                                       materials_beside(), session_, one);
+            if (const std::uint64_t bytes = bytes_at(path); bytes > 0) report_bytes(path, bytes, one);
+            one.set("output", path);
+            rows_.add_rows(one);
+            outputs_.push_back(one.json());
+        }
+    }
+
+    const Report& rows() const { return rows_; }
+    const Json& json() const { return outputs_; }
+
+private:
+    const std::string& materials_beside() const { return options_.mesh.empty() ? options_.input : options_.mesh; }
+
+    void report_bytes(const std::string& path, std::uint64_t bytes, Report& report) const {
+        const double times = double(cache_bytes_) / double(bytes);
+        report.row(path,
+                   fmt::format("{} bytes, {}", with_commas(bytes),
+                               times >= 1 ? fmt::format("{:.3g} times smaller than the positions of all frames", times)
+                                          : std::string("larger than the positions of all frames")));
+        report.set("bytes", bytes);
+        report.set("times_smaller", times);
+    }
+
+    void write_model(const std::string& path, Report& report) {
+        if (options_.profile == FitProfile::plain) return session_.write_model(fitted_.model, path, fitted_.poses);
+        session_.begin_writing(path);
+        if (options_.profile == FitProfile::lossless) {
+            require(pack_model_lossless(fitted_.model, fitted_.poses, path, session_.context()));
+            return;
+        }
+        PackOptions pack;
+        pack.levels = options_.profile == FitProfile::stream;
+        pack.keep_order = options_.keep_order;
+        pack.bits = options_.bits.value_or(bits_for(options_.fit.error, fitted_.model.mesh));
+        pack.clip_error = options_.fit.base ? pack.clip_error : kShareOfPoses * options_.fit.error;
+        const PackReport packed = require(pack_model(fitted_.model, fitted_.poses, pack, path, session_.context()));
+        measure_packed(path, packed, pack, report);
+    }
+
+    /// Packed models are rounded, and bound anew when they are read: what they come to is measured on the file.
+    void measure_packed(const std::string& path, const PackReport& packed, const PackOptions& pack, Report& report) {
+        PoseSequence poses;
+        const Model model = session_.read_model(path, &poses);
+        const AnimationError error =
+            require(animation_error(model, poses, animation_, packed.vertex_order, session_.context()));
+        const double diagonal = fitted_.report.diagonal, rms = error.rms / diagonal, max = error.max / diagonal;
+        const Index vertex = packed.vertex_order.empty() ? error.max_vertex : packed.vertex_order[error.max_vertex];
+        report.row("error when packed", error_text(rms, max, error.max_frame, vertex));
+        report.set("rms", rms);
+        report.set("max", max);
+        report.set("bits", pack.bits);
+        if (options_.fit.base) return;
+        if (rms > options_.fit.error || max > options_.fit.max_error.value_or(max))
+            session_.warn(fmt::format("{}: packed, the error is {:.2g} of the diagonal (rms) and {:.2g} at most; "
+                                      "{} keeps what was fitted.",
+                                      path, rms, max,
+                                      pack.bits < 16 && fitted_.report.parted == 0 ? "--bits 16 or --profile lossless"
+                                                                                   : "--profile lossless"));
+    }
+
+    void write_page(const std::string& path, Report& report) {
+        OutputFolder folder(path, options_.input);
+        WebPage page(folder, fs::path(options_.input).stem().string(), WebModel::glb);
+        AnimationOutput animation = options_.animation;
+        animation.skin.all_levels = true;
+        write_animation_output(fitted_.model, frames_of(fitted_.poses), {}, animation, page.model_path(),
+                               materials_beside(), session_, report);
+        const std::uint64_t bytes = bytes_at(page.model_path());
+        page.write(session_);
+        folder.keep();
+        report_bytes((fs::path(path) / "model.glb").string(), bytes, report);
+        const std::string index = (fs::path(path) / "index.html").string();
+        report.add("page", index, "page", index);
+    }
+
+    const FitArguments& options_;
+    const Fitted& fitted_;
+    const MeshAnimation& animation_;
+    Session& session_;
+    std::uint64_t cache_bytes_;
+    Report rows_;
+    Json outputs_ = Json::array();
+};
+
+void report_fit(const FitReport& fit, double seconds, Report& report) {
+    report.add("animation", fmt::format("{} vertices, {} frames", with_commas(fit.vertices), with_commas(fit.frames)),
+               "vertices", fit.vertices);
+    report.set("frames", fit.frames);
+    report.add("driver",
+               fmt::format("{} vertices, chosen by the {}", with_commas(fit.driver_vertices),
+                           fit.choice == DriverChoice::rest ? "rest shape" : "motion"),
+               "driver_vertices", fit.driver_vertices);
+    report.set("choice", std::string(name_of(fit.choice)));
+    report.row("error", error_text(fit.rms, fit.max, fit.max_frame, fit.max_vertex));
+    report.set("rms", fit.rms);
+    report.set("max", fit.max);
+    report.set("max_frame", fit.max_frame + 1);
+    report.set("max_vertex", fit.max_vertex);
+    report.row("normals", fmt::format("{:.2g} degrees off on average, 95 % less than {:.2g}", fit.normal_mean_deg,
+                                      fit.normal_p95_deg));
+    report.set("normal_mean_degrees", fit.normal_mean_deg);
+    report.set("normal_p95_degrees", fit.normal_p95_deg);
+    report.set("parted_vertices", fit.parted);
+    report.set("tries", fit.tries);
+    report.add("fitted in", seconds_text(seconds), "fit_seconds", seconds);
+}
+
+void run(FitArguments options, Session& session) {
+    check(options, session);
+    Input input;
+    open_input(options, session, input);
+    if (options.rest > 0)
+        options.fit.rest_frame = options.rest - 1;
+    else if (input.needs_rest)
+        options.fit.rest_frame = require(least_stretched_frame(input.animation, session.context()));
+    const double start = now_seconds();
+    FitOptions fit = options.fit;
+    if (options.rounds() && !fit.base) fit.error = left_for_fit(fit.error);
+    const Fitted fitted = require(with_hint(fit_animation(input.animation, fit, session.context()), ErrorCode::mismatch,
+                                            "--mesh and the animation belong to one object."));
+    const double seconds = now_seconds() - start;
+    Report report;
+    report.set("outputs", options.outputs);
+    if (options.fit.rest_frame)
+        report.add("rest shape", fmt::format("frame {}", *options.fit.rest_frame + 1), "rest_frame",
+                   *options.fit.rest_frame + 1);
+    report_fit(fitted.report, seconds, report);
+    if (input.joints > 0 && input.joints < fitted.report.driver_vertices)
+        session.warn(fmt::format("{}: is a skin of {} joints, and the fit has {}. The file itself is smaller than an "
+                                 "exported fit; a packed model (.fil) may be smaller still.",
+                                 options.input, input.joints, with_commas(fitted.report.driver_vertices)));
+    FitOutputs outputs(options, fitted, input.animation, session);
+    outputs.write();
+    report.add_rows(outputs.rows());
+    report.set("written", outputs.json());
+    session.print(report);
+}
+
+} // namespace
+
+Command fit_command() {
+    const auto options = std::make_shared<FitArguments>();
+    return {
+        .name = "fit",
+        .text = "Fit a driver and its poses to any animated mesh: a small model that follows it",
+        .options =
+            OptionList{
+                Option("animation", options->input,
+                       "Animation: .pc2, .mdd, an animated glTF, a folder of numbered meshes or NAME_####.obj, a model "
+                       "with poses")
+                    .is_read()
+                    .required(),
+                Option("--mesh", options->mesh, "Mesh that the animation moves, at rest; .pc2 and .mdd need it")
+                    .is_read(),
+                Option("-o,--output", options->outputs,
+                       "Output: a model with its poses (.fil), the detailed mesh in motion (.glb, .pc2, .mdd, .usda), "
+                       "a folder of meshes (NAME/), with --web a page. May come several times")
+                    .is_written()
+                    .one_at_a_time()
+                    .required(),
+                Option("--error", options->fit.error,
+                       "Largest error: rms over vertices and frames, fraction of the diagonal")
+                    .between(1e-9, 1.0)
+                    .with_default(),
+                Option("--max-error", options->fit.max_error,
+                       "Largest error of any vertex in any frame, fraction of the diagonal (default: any)")
+                    .above_zero(),
+                Option("--base", options->fit.base, "Vertices of the driver; the error is then what it is")
+                    .whole_from(12)
+                    .excludes({"--error", "--max-error"}),
+                Option("--rest", options->rest,
+                       "Frame whose mesh is the rest shape, from 1 (default: --mesh, or that of the glTF; for "
+                       "numbered meshes the frame from which others are stretched least)")
+                    .whole_from(1)} +
+            pose_file_options(options->pose_file) +
+            OptionList{Option("--web", options->web, "Write folders as pages that show the model in a browser"),
+                       choice<FitProfile>("--profile", options->profile,
+                                          {{"compact", FitProfile::compact},
+                                           {"stream", FitProfile::stream},
+                                           {"lossless", FitProfile::lossless}},
+                                          "Pack the .fil: compact (the smallest), stream (coarse to fine) or lossless. "
+                                          "The error asked for holds for the packed file (default: a plain model)"),
+                       Option("--bits", options->bits,
+                              "With --profile compact or stream: bits of a position (default: by the error)")
+                           .between(10, 16),
+                       Option("--keep-order", options->keep_order,
+                              "With --profile compact: keep the order of vertices and faces")} +
+            animation_options(options->animation),
+        .examples = "  filigree fit cache.pc2 --mesh rest.obj --error 1e-4 -o out.glb -o out.fil\n"
+                    "  filigree fit walk.glb --animation Run -o walk.fil --profile compact\n"
+                    "  filigree fit frames_####.obj -o page/ --web\n"
+                    "  filigree fit cache.pc2 --mesh rest.obj --base 300 -o out.fil",
+        .run = [options](Session& session) { run(*options, session); }};
+}
+
+} // namespace filigree::cli
