@@ -19,9 +19,9 @@ import python_reference
 PARTS = {
     "Tutorials": ["tutorials/README"],
     "First steps": ["command-line", "python", "blender", "studio", "gallery"],
-    "Guides": ["blend-code", "fitting", "packing", "handles", "bodies", "bodies-theory", "scenes", "fracture", "melting", "remesh", "inside-points", "rendering", "exchange", "cluster", "web"],
+    "Guides": ["blend-code", "fitting", "packing", "handles", "bodies", "bodies-theory", "scenes", "fracture", "melting", "remesh", "inside-points", "rendering", "exchange", "cluster", "web", "runtime"],
     "File formats": ["formats", "animations", "fil-format"],
-    "How it works": ["reference-code", "figures", "benchmarks", "reliability", "conventions", "architecture", "decisions/README", "contributing", "dependencies", "releasing"],
+    "How it works": ["reference-code", "figures", "benchmarks", "reliability", "conventions", "platforms", "architecture", "decisions/README", "contributing", "dependencies", "releasing"],
 }
 PROGRAM_FOLDERS = ["apps/cli", "apps/studio", "bench/interactive", "report", "bindings/python/src", "bindings/python/filigree",
                    "addons/blender"]
