@@ -55,7 +55,7 @@ uint32_t flg_abi(void);
 typedef struct flg_model flg_model;
 
 /* For flg_options.flags. */
-#define FLG_WITHOUT_CHECKSUMS 1u /* do not hash the sections (a fifth of the time of opening) */
+#define FLG_WITHOUT_CHECKSUMS 1u /* do not hash the sections: opens sooner, damage may stay unseen */
 #define FLG_WITHOUT_NORMALS 2u
 #define FLG_WITHOUT_TRIANGLES 4u /* no index arrays of the mesh; the driver's are kept */
 #define FLG_WITHOUT_FIT 8u       /* no gradient fit: every pose needs gradients */
@@ -85,30 +85,30 @@ flg_status flg_open(const void* bytes, size_t size, const flg_options* options, 
 void flg_close(flg_model* model);
 
 /* Where a model's normals come from. */
-#define FLG_NORMALS_NONE 0u      /* opened without */
-#define FLG_NORMALS_VERTEX 1u    /* the file's, one a vertex */
-#define FLG_NORMALS_CORNER 2u    /* the file's, chosen by the corners of faces: flg_triangle_normals */
-#define FLG_NORMALS_COMPUTED 3u  /* the file has none: of the faces at rest, weighted by area; one a vertex */
+#define FLG_NORMALS_NONE 0u     /* opened without */
+#define FLG_NORMALS_VERTEX 1u   /* the file's, one a vertex */
+#define FLG_NORMALS_CORNER 2u   /* the file's, chosen by the corners of faces: flg_triangle_normals */
+#define FLG_NORMALS_COMPUTED 3u /* the file has none: of the faces at rest, weighted by area; one a vertex */
 
 typedef struct flg_info {
-    uint32_t struct_size;      /* sizeof(flg_info), set by the caller */
-    uint32_t vertices;         /* positions that a restore writes */
-    uint32_t normals;          /* normals that a restore writes; 0 without */
-    uint32_t normal_source;    /* FLG_NORMALS_... */
-    uint32_t triangles;        /* of the level that was opened, faces as fans */
+    uint32_t struct_size;   /* sizeof(flg_info), set by the caller */
+    uint32_t vertices;      /* positions that a restore writes */
+    uint32_t normals;       /* normals that a restore writes; 0 without */
+    uint32_t normal_source; /* FLG_NORMALS_... */
+    uint32_t triangles;     /* of the level that was opened, faces as fans */
     uint32_t faces;
     uint32_t driver_vertices;
-    uint32_t driver_triangles; /* 0: the driver is points */
-    uint32_t levels;           /* in the file, the finest included */
-    uint32_t level;            /* the one that was opened */
-    uint32_t parts;            /* flg_restore_parts */
-    uint32_t frames;           /* poses in the file */
+    uint32_t driver_triangles;      /* 0: the driver is points */
+    uint32_t levels;                /* in the file, the finest included */
+    uint32_t level;                 /* the one that was opened */
+    uint32_t parts;                 /* flg_restore_parts */
+    uint32_t frames;                /* poses in the file */
     uint32_t frames_have_gradients; /* 0 or 1 */
-    uint32_t int16_records;    /* 0 or 1 */
-    uint32_t has_fit;          /* 0 or 1 */
-    uint32_t lanes;            /* vertices at a time */
-    double frames_per_second;  /* 0 without frames */
-    double origin[3];          /* to be added to all positions */
+    uint32_t int16_records;         /* 0 or 1 */
+    uint32_t has_fit;               /* 0 or 1 */
+    uint32_t lanes;                 /* vertices at a time */
+    double frames_per_second;       /* 0 without frames */
+    double origin[3];               /* to be added to all positions */
 } flg_info;
 
 /* Fills the first info->struct_size bytes. Errors: ARGUMENT (struct_size is not set, or larger than this runtime's). */

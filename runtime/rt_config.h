@@ -7,12 +7,13 @@
 #include <stdint.h>
 
 /* The same bytes everywhere need plain IEEE arithmetic. */
-#if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(_M_FP_FAST) || \
+#if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(_M_FP_FAST) ||  \
     (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
 #error "filigree_rt gives the same bytes everywhere, which -ffast-math and its parts prevent: compile it without them."
 #endif
 #if FLT_EVAL_METHOD != 0 || FLT_RADIX != 2 || FLT_MANT_DIG != 24 || DBL_MANT_DIG != 53
-#error "filigree_rt needs float and double of IEEE 754, not evaluated in a wider type: for 32-bit x86 compile with -msse2 -mfpmath=sse."
+#error                                                                                                                 \
+    "filigree_rt needs float and double of IEEE 754, not evaluated in a wider type: for 32-bit x86 compile with -msse2 -mfpmath=sse."
 #endif
 #if defined(__BYTE_ORDER__) && __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
 #error "filigree_rt reads model files as the processor keeps numbers, and they are little-endian."
@@ -50,7 +51,7 @@
 
 /* Vector extensions, and a processor with vectors. FLG_NO_VECTORS: leave them out, one vertex at a time. */
 #if !defined(FLG_NO_VECTORS) && defined(__has_builtin)
-#if __has_builtin(__builtin_shufflevector) && __has_builtin(__builtin_convertvector) && \
+#if __has_builtin(__builtin_shufflevector) && __has_builtin(__builtin_convertvector) &&                                \
     (defined(__SSE2__) || defined(__ARM_NEON) || defined(__wasm_simd128__) || defined(__VSX__))
 #define FLG_HAS_VECTORS 1
 #if defined(__x86_64__) && !defined(FLG_NO_WIDE_VECTORS)

@@ -9,23 +9,25 @@
 #include <string.h>
 
 enum {
-    FLG_NEAR = 24,                            /* neighbours among all vertices */
-    FLG_FAR = 8,                              /* and among some */
+    FLG_NEAR = 24, /* neighbours among all vertices */
+    FLG_FAR = 8,   /* and among some */
     FLG_TERMS = FLG_NEAR + FLG_FAR,
-    FLG_THINNING = 8,                         /* one in so many vertices is among some */
-    FLG_TRIED = 3,                            /* candidates for each neighbour wanted */
-    FLG_CANDIDATES = FLG_TRIED * FLG_NEAR,    /* the most that are looked for */
-    FLG_ROOM = 2 * FLG_CANDIDATES + 8,        /* for those found so far */
-    FLG_SMALLEST_PART = 32,                   /* places; smaller parts see all others */
-    FLG_LEAF = 8,                             /* points of a tree's leaf */
-    FLG_ROWS = FLG_TERMS + 1 + 4,             /* equations, the most there are */
-    FLG_STRIDE = (FLG_ROWS + 3 + 3) / 4 * 4   /* of the matrix, with three right sides */
+    FLG_THINNING = 8,                       /* one in so many vertices is among some */
+    FLG_TRIED = 3,                          /* candidates for each neighbour wanted */
+    FLG_CANDIDATES = FLG_TRIED * FLG_NEAR,  /* the most that are looked for */
+    FLG_ROOM = 2 * FLG_CANDIDATES + 8,      /* for those found so far */
+    FLG_SMALLEST_PART = 32,                 /* places; smaller parts see all others */
+    FLG_LEAF = 8,                           /* points of a tree's leaf */
+    FLG_ROWS = FLG_TERMS + 1 + 4,           /* equations, the most there are */
+    FLG_STRIDE = (FLG_ROWS + 3 + 3) / 4 * 4 /* of the matrix, with three right sides */
 };
-static const float FLG_ACROSS = 0.2f;      /* cosine from which a vertex is in front of the surface */
-static const double FLG_QUADRATICS = 10;   /* how cheap quadratic terms are beside the kernel; from 1 to 100 little changes */
-static const double FLG_RIDGE = 3e-8;      /* on the kernel: keeps vertices almost at one place solvable */
-static const double FLG_FLAT = 6e-4, FLG_SOLID = 6e-3; /* thickness in widths: below the first completed, above the sum */
-static const double FLG_NO_SPREAD = 1e-4;  /* thickness in widths below which a direction has no linear term */
+static const float FLG_ACROSS = 0.2f; /* cosine from which a vertex is in front of the surface */
+static const double FLG_QUADRATICS =
+    10; /* how cheap quadratic terms are beside the kernel; from 1 to 100 little changes */
+static const double FLG_RIDGE = 3e-8; /* on the kernel: keeps vertices almost at one place solvable */
+static const double FLG_FLAT = 6e-4,
+                    FLG_SOLID = 6e-3;     /* thickness in widths: below the first completed, above the sum */
+static const double FLG_NO_SPREAD = 1e-4; /* thickness in widths below which a direction has no linear term */
 static const uint32_t FLG_NONE = 0xffffffffu;
 
 /* The terms of a vertex's sum. */
@@ -118,7 +120,8 @@ static void doubled_area_vector(const float* positions, const uint32_t* corners,
         previous[k] = (double)positions[3 * (size_t)corners[1] + (size_t)k] - (double)first[k];
     }
     for (size_t i = 2; i < count; ++i) {
-        for (int k = 0; k < 3; ++k) current[k] = (double)positions[3 * (size_t)corners[i] + (size_t)k] - (double)first[k];
+        for (int k = 0; k < 3; ++k)
+            current[k] = (double)positions[3 * (size_t)corners[i] + (size_t)k] - (double)first[k];
         cross(previous, current, turned);
         for (int k = 0; k < 3; ++k) {
             sum[k] += turned[k];
@@ -130,7 +133,8 @@ static void doubled_area_vector(const float* positions, const uint32_t* corners,
 void flg_vertex_normals(const float* positions, size_t count, const flg_faces* faces, double* sums, float* normals) {
     memset(sums, 0, 3 * count * sizeof *sums);
     for (size_t f = 0; f < faces->count; ++f) {
-        const size_t begin = faces->offsets ? faces->offsets[f] : 3 * f, end = faces->offsets ? faces->offsets[f + 1] : begin + 3;
+        const size_t begin = faces->offsets ? faces->offsets[f] : 3 * f,
+                     end = faces->offsets ? faces->offsets[f + 1] : begin + 3;
         double normal[3];
         doubled_area_vector(positions, faces->corners + begin, end - begin, normal);
         for (size_t c = begin; c < end; ++c)
@@ -158,8 +162,8 @@ static FLG_COLD void find_places(const float* rest, uint32_t count, uint32_t* ta
     for (size_t k = 0; k < slots; ++k) table[k] = FLG_NONE;
     for (uint32_t v = 0; v < count; ++v) {
         const float* p = rest + 3 * (size_t)v;
-        uint64_t hash = ((uint64_t)float_bits(p[0]) << 32 | float_bits(p[1])) ^
-                        (uint64_t)float_bits(p[2]) * 0x9e3779b97f4a7c15ull;
+        uint64_t hash =
+            ((uint64_t)float_bits(p[0]) << 32 | float_bits(p[1])) ^ (uint64_t)float_bits(p[2]) * 0x9e3779b97f4a7c15ull;
         size_t slot;
         hash = (hash ^ hash >> 29) * 0xbf58476d1ce4e5b9ull;
         hash ^= hash >> 32;
@@ -335,7 +339,9 @@ static double squared_distance(const float* a, const float* b) {
 static double squared_distance_to_box(const float* p, const float* box) {
     double d[3];
     for (int k = 0; k < 3; ++k)
-        d[k] = p[k] < box[k] ? (double)box[k] - (double)p[k] : p[k] > box[3 + k] ? (double)p[k] - (double)box[3 + k] : 0;
+        d[k] = p[k] < box[k]       ? (double)box[k] - (double)p[k]
+               : p[k] > box[3 + k] ? (double)p[k] - (double)box[3 + k]
+                                   : 0;
     return d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
 }
 
@@ -592,8 +598,7 @@ flg_fit* flg_fit_begin(const float* rest, uint32_t count, const flg_faces* faces
     fit->place = (uint32_t*)flg_allocate(allocator, count, sizeof(uint32_t));
     fit->part_of = (uint32_t*)flg_allocate(allocator, count, sizeof(uint32_t));
     fit->normals = (float*)flg_allocate(allocator, count, 3 * sizeof(float));
-    if (fit->rest && fit->terms && fit->flatness && fit->rest_error && fit->place && fit->part_of &&
-        fit->normals) {
+    if (fit->rest && fit->terms && fit->flatness && fit->rest_error && fit->place && fit->part_of && fit->normals) {
         memcpy(fit->rest, rest, 3 * (size_t)count * sizeof(float));
         if (prepare(fit, faces)) return fit;
     }

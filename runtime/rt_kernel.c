@@ -14,7 +14,7 @@ typedef struct flg_cell {
 #else
     _Alignas(64)
 #endif
-    float base[16];
+        float base[16];
     float du[16], dv[16];
 } flg_cell;
 
@@ -135,7 +135,7 @@ void flg_restore_block(const flg_kernel* kernel, const flg_records* records, con
 static int exponent_of(double x) {
     uint64_t bits;
     int lower = 0;
-    if (x < DBL_MIN) { /* subnormal */
+    if (x < DBL_MIN) {            /* subnormal */
         x *= 18014398509481984.0; /* 2^54 */
         lower = 54;
     }

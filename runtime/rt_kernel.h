@@ -20,7 +20,7 @@ typedef struct flg_transform {
 #else
     _Alignas(64)
 #endif
-    float t[3];
+        float t[3];
     float a[9];
     float half_rest[3];
     float unused;
@@ -32,23 +32,23 @@ typedef struct flg_run {
 } flg_run;
 
 enum {
-    FLG_MAX_RUN = 512,      /* records of a run */
-    FLG_PADDING = 16,       /* numbers behind each array of records that may be read */
-    FLG_BLOCK = 1 << 15,    /* records at a time when order is asked for: their points stay in the second-level cache */
-    FLG_GROUP = 1024        /* records at a time whose normals stay in the first-level cache; a block's buffer has so
-                             * many points more than a block */
+    FLG_MAX_RUN = 512,   /* records of a run */
+    FLG_PADDING = 16,    /* numbers behind each array of records that may be read */
+    FLG_BLOCK = 1 << 15, /* records at a time when order is asked for: their points stay in the second-level cache */
+    FLG_GROUP = 1024     /* records at a time whose normals stay in the first-level cache; a block's buffer has so
+                          * many points more than a block */
 };
 
 /* Everything that does not change from pose to pose; either q or offset is there. */
 typedef struct flg_records {
     const flg_run* runs;
-    const uint32_t* cells; /* 3 driver vertices each */
-    const float *u, *v;    /* float records */
-    const float* q[3];     /* float records: p - m / 2 */
-    const int16_t *u16, *v16;  /* int16 records: 32767 is 1; NULL: float records */
-    const int16_t* offset[3];  /* int16 records: (p - m) / scale of the cell */
-    const float* scale;        /* int16 records: one a cell */
-    const float* normal[3];    /* unit rest normals, where they are wanted */
+    const uint32_t* cells;    /* 3 driver vertices each */
+    const float *u, *v;       /* float records */
+    const float* q[3];        /* float records: p - m / 2 */
+    const int16_t *u16, *v16; /* int16 records: 32767 is 1; NULL: float records */
+    const int16_t* offset[3]; /* int16 records: (p - m) / scale of the cell */
+    const float* scale;       /* int16 records: one a cell */
+    const float* normal[3];   /* unit rest normals, where they are wanted */
 } flg_records;
 
 /* What restored points are multiplied with, powers of two: positions, and normals before they get length one. */
@@ -104,8 +104,8 @@ FLG_INLINE flg_place flg_buffer(int wanted, float* points) {
     place.room = FLG_BLOCK_ROOM;
     return place;
 }
-/* rt_scatter.c: restores runs that are in no block. slot: where record r goes, or NULL: it goes to r. positions, normals: of slot 0,
- * packed. */
+/* rt_scatter.c: restores runs that are in no block. slot: where record r goes, or NULL: it goes to r. positions,
+ * normals: of slot 0, packed. */
 FLG_SHARED void flg_restore_scattered(const flg_kernel* kernel, const flg_records* records,
                                       const flg_transform* transforms, flg_scales scales, size_t run_begin,
                                       size_t run_end, const uint32_t* slot, float* positions, float* normals,
@@ -127,7 +127,8 @@ FLG_SHARED float flg_normal_scale(const flg_transform* transforms, size_t count)
 /* m, the point of a cell that a record hangs on. */
 FLG_INLINE void flg_anchor(const float* corner0, const float* corner1, const float* corner2, double u, double v,
                            double m[3]) {
-    for (int k = 0; k < 3; ++k) m[k] = (1 - u - v) * (double)corner0[k] + u * (double)corner1[k] + v * (double)corner2[k];
+    for (int k = 0; k < 3; ++k)
+        m[k] = (1 - u - v) * (double)corner0[k] + u * (double)corner1[k] + v * (double)corner2[k];
 }
 
 /* q of a float record: p - m / 2, relative to the centre and times inner_scale. */

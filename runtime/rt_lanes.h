@@ -36,8 +36,8 @@ typedef float FLG_NAME(lanes_);
     m(t, 0), m(t, 1), m(t, 2), m(t, 3), m(t, 4), m(t, 5), m(t, 6), m(t, 7), m(t, 8), m(t, 9), m(t, 10), m(t, 11),      \
         m(t, 12), m(t, 13), m(t, 14), m(t, 15)
 #endif
-#define FLG_POINT(t, i) (((t) * FLG_N + (i)) / 3)
-#define FLG_AXIS(t, i) (((t) * FLG_N + (i)) % 3)
+#define FLG_POINT(t, i) (((t)*FLG_N + (i)) / 3)
+#define FLG_AXIS(t, i) (((t)*FLG_N + (i)) % 3)
 #define FLG_TAKE_XY(t, i) ((FLG_AXIS(t, i) == 1 ? FLG_N : 0) + FLG_POINT(t, i))
 #define FLG_TAKE_Z(t, i) (FLG_AXIS(t, i) == 2 ? FLG_N + FLG_POINT(t, i) : (i))
 #define FLG_THIRD(t)                                                                                                   \
@@ -55,7 +55,8 @@ FLG_HERE void FLG_NAME(store_points_)(float* p, FLG_VEC x, FLG_VEC y, FLG_VEC z)
 #endif
 }
 
-FLG_TARGET FLG_APART void FLG_NAME(set_cell_)(flg_cell* cell, const uint32_t* corners, const flg_transform* transforms) {
+FLG_TARGET FLG_APART void FLG_NAME(set_cell_)(flg_cell* cell, const uint32_t* corners,
+                                              const flg_transform* transforms) {
     const float *t0 = transforms[corners[0]].t, *t1 = transforms[corners[1]].t, *t2 = transforms[corners[2]].t;
     for (int k = 0; k < 16; k += FLG_N) {
         const FLG_VEC first = FLG_LOAD(t0 + k);
@@ -143,8 +144,8 @@ FLG_HERE FLG_VEC FLG_NAME(at_least_tiny_)(FLG_VEC x) {
 
 /* Gives normals length one, in a loop of its own: the root's latency is long, and here several are under way at once.
  * A zero normal stays zero. */
-FLG_TARGET FLG_APART void FLG_NAME(store_unit_)(const flg_long_normals* normals, size_t count, float scale, float* points,
-                                    size_t room) {
+FLG_TARGET FLG_APART void FLG_NAME(store_unit_)(const flg_long_normals* normals, size_t count, float scale,
+                                                float* points, size_t room) {
     for (size_t k = 0; k < count; k += FLG_N) {
         const FLG_VEC n0 = scale * FLG_LOAD(normals->at[0] + k), n1 = scale * FLG_LOAD(normals->at[1] + k),
                       n2 = scale * FLG_LOAD(normals->at[2] + k);
@@ -188,11 +189,11 @@ FLG_HERE void FLG_NAME(restore_some_)(const flg_records* records, const flg_tran
 }
 
 FLG_TARGET static void FLG_NAME(restore_runs_)(const flg_records* records, const flg_transform* transforms,
-                                               flg_scales scales, size_t run_begin, size_t run_end,
-                                               flg_place positions, flg_place normals) {
+                                               flg_scales scales, size_t run_begin, size_t run_end, flg_place positions,
+                                               flg_place normals) {
 #define FLG_SOME(int16, with_positions, with_normals)                                                                  \
-    FLG_NAME(restore_some_)(records, transforms, scales, run_begin, run_end, positions, normals, int16,                \
-                            with_positions, with_normals)
+    FLG_NAME(restore_some_)                                                                                            \
+    (records, transforms, scales, run_begin, run_end, positions, normals, int16, with_positions, with_normals)
     if (normals.points) { /* without positions where corners have normals of their own: not worth a loop of its own */
         const int with_positions = positions.points != NULL;
         if (records->u16)
@@ -253,7 +254,7 @@ FLG_TARGET static void FLG_NAME(sum_terms_)(const double* weights, const uint32_
 }
 
 static const flg_kernel FLG_NAME(kernel_) = {FLG_N, FLG_NAME(restore_runs_), FLG_NAME(subtract_row_),
-                                            FLG_NAME(sum_terms_)};
+                                             FLG_NAME(sum_terms_)};
 
 #undef FLG_JOIN2
 #undef FLG_JOIN

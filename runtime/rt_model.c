@@ -139,7 +139,7 @@ static flg_status read_container(const void* bytes, size_t size, flg_file* file)
         end = section.offset + section.count * section.item;
     }
     return find_section(file, "cd.par", 0, &ignored) || find_section(file, "ll.tab", 0, &ignored) ? FLG_UNSUITABLE
-                                                                                                    : FLG_OK;
+                                                                                                  : FLG_OK;
 }
 
 static int has_its_hash(const flg_file* file, const flg_section* section) {
@@ -175,9 +175,9 @@ typedef struct flg_opening {
     flg_piece* scratch; /* until opening ends */
     uint32_t flags;
     flg_status status;
-    uint32_t all_vertices; /* in the file: with those of a driver behind the mesh's own */
-    float* positions;      /* of all vertices, at rest */
-    uint32_t* record_of;   /* of each vertex: its record in the file's order */
+    uint32_t all_vertices;         /* in the file: with those of a driver behind the mesh's own */
+    float* positions;              /* of all vertices, at rest */
+    uint32_t* record_of;           /* of each vertex: its record in the file's order */
     uint32_t *vertex_of, *cell_of; /* of each record */
     float *u, *v;                  /* float records, in the file's order */
     int16_t *u16, *v16, *steps;    /* int16 records; 3 steps each */
@@ -205,8 +205,12 @@ static FLG_COLD void* take_piece(flg_opening* o, flg_piece** pieces, uint64_t co
     return piece + 1;
 }
 /* Memory of the model, and memory until opening ends; NULL after an error. */
-static FLG_COLD void* keep(flg_opening* o, uint64_t count, size_t item) { return take_piece(o, &o->model->pieces, count, item); }
-static FLG_COLD void* borrow(flg_opening* o, uint64_t count, size_t item) { return take_piece(o, &o->scratch, count, item); }
+static FLG_COLD void* keep(flg_opening* o, uint64_t count, size_t item) {
+    return take_piece(o, &o->model->pieces, count, item);
+}
+static FLG_COLD void* borrow(flg_opening* o, uint64_t count, size_t item) {
+    return take_piece(o, &o->scratch, count, item);
+}
 
 static FLG_COLD void release_pieces(const flg_allocator* allocator, flg_piece* piece) {
     while (piece) {
@@ -275,7 +279,7 @@ static FLG_COLD void* read_chunks(flg_opening* o, const char* name, uint32_t ite
 
 /* Faces whose corners are below `limit`, borrowed. prefix: "mesh" or "lev". */
 static FLG_COLD void read_faces(flg_opening* o, const char* prefix, uint32_t index, uint32_t limit, flg_faces* faces,
-                       uint32_t* corner_count) {
+                                uint32_t* corner_count) {
     char name[9];
     uint64_t corners, sizes, offsets;
     uint32_t *size, *offset, *corner;
@@ -314,7 +318,8 @@ static FLG_COLD void read_faces(flg_opening* o, const char* prefix, uint32_t ind
 }
 
 /* Fans: 3 of `values`, which has an item a corner (NULL: the corner's number), for each triangle. */
-static FLG_COLD uint32_t* make_fans(flg_opening* o, const flg_faces* faces, const uint32_t* values, uint32_t triangles) {
+static FLG_COLD uint32_t* make_fans(flg_opening* o, const flg_faces* faces, const uint32_t* values,
+                                    uint32_t triangles) {
     uint32_t* to = (uint32_t*)keep(o, triangles, 3 * sizeof(uint32_t));
     size_t at = 0;
     for (size_t f = 0; to && f < faces->count; ++f) {
@@ -638,7 +643,7 @@ static FLG_COLD void fill_records(flg_opening* o, flg_record_set* set, const uin
 
 /* vertices: as for order_set. normals: the unit normal of each slot at rest, or NULL. */
 static FLG_COLD void make_set(flg_opening* o, flg_record_set* set, uint32_t slots, const uint32_t* vertices,
-                     const float* normals, int with_positions) {
+                              const float* normals, int with_positions) {
     uint32_t* record;
     if (o->status != FLG_OK) return;
     set->slots = slots;
@@ -669,7 +674,7 @@ static FLG_COLD void make_set(flg_opening* o, flg_record_set* set, uint32_t slot
  * value then belongs to one vertex. *values grows to them; vertex_of: of each value. Values that no corner uses are
  * bound to vertex 0, and mean nothing. corners: of the normals; changed to the copies. */
 static FLG_COLD float* split_normals(flg_opening* o, const float* values, uint32_t count, uint32_t* corners,
-                            uint32_t** vertex_of, uint32_t* all) {
+                                     uint32_t** vertex_of, uint32_t* all) {
     uint32_t *first = (uint32_t*)borrow(o, count, sizeof(uint32_t)), *table, *copy_value, *copy_vertex;
     uint64_t shared = 0, slots = 2;
     uint32_t copies = 0;
@@ -694,8 +699,7 @@ static FLG_COLD float* split_normals(flg_opening* o, const float* values, uint32
         if (value == FLG_NO_INDEX || first[value] == vertex) continue;
         slot = ((uint64_t)value << 32 | vertex) * 0x9e3779b97f4a7c15ull;
         slot = (slot ^ slot >> 32) & (slots - 1);
-        while (table[slot] != FLG_NO_INDEX &&
-               (copy_value[table[slot]] != value || copy_vertex[table[slot]] != vertex))
+        while (table[slot] != FLG_NO_INDEX && (copy_value[table[slot]] != value || copy_vertex[table[slot]] != vertex))
             slot = (slot + 1) & (slots - 1);
         if (table[slot] == FLG_NO_INDEX) {
             table[slot] = copies;
@@ -771,8 +775,8 @@ static FLG_COLD void make_sets(flg_opening* o) {
     }
     make_set(o, &model->vertices, info->vertices, model->level_vertices,
              info->normal_source == FLG_NORMALS_CORNER ? NULL : normals, 1);
-    info->parts = model->vertices.blocks > model->corner_normals.blocks ? model->vertices.blocks
-                                                                         : model->corner_normals.blocks;
+    info->parts =
+        model->vertices.blocks > model->corner_normals.blocks ? model->vertices.blocks : model->corner_normals.blocks;
 }
 
 /* ---- Frames ---- */
@@ -837,8 +841,8 @@ static FLG_COLD void make_fit(flg_opening* o) {
     faces.corners = model->driver_triangles;
     faces.offsets = NULL;
     faces.count = model->info.driver_triangles;
-    model->fit = flg_fit_begin(model->driver_rest, model->info.driver_vertices, &faces, model->kernel,
-                               &model->allocator);
+    model->fit =
+        flg_fit_begin(model->driver_rest, model->info.driver_vertices, &faces, model->kernel, &model->allocator);
     if (!model->fit) {
         fails(o, FLG_NO_MEMORY);
         return;
@@ -1077,8 +1081,8 @@ size_t flg_scratch_bytes(const flg_model* model) {
 }
 
 FLG_APART void restore_block_of(const flg_model* model, const flg_record_set* set, uint32_t block,
-                             const flg_transform* transforms, flg_scales scales, flg_slots positions, flg_slots normals,
-                             float* scratch) {
+                                const flg_transform* transforms, flg_scales scales, flg_slots positions,
+                                flg_slots normals, float* scratch) {
     const size_t first = (size_t)block * FLG_BLOCK, left = set->slots - first;
     if (positions.points) positions.points += first * positions.stride;
     if (normals.points) normals.points += first * normals.stride;
@@ -1114,7 +1118,8 @@ FLG_APART flg_status restore_parts(const flg_model* model, const void* pose, uin
             restore_block_of(model, &model->vertices, part, transforms, set->scales, to,
                              with_normals ? normals_to : nowhere, aligned);
         if (part < model->corner_normals.blocks && normals)
-            restore_block_of(model, &model->corner_normals, part, transforms, set->scales, nowhere, normals_to, aligned);
+            restore_block_of(model, &model->corner_normals, part, transforms, set->scales, nowhere, normals_to,
+                             aligned);
     }
     return FLG_OK;
 }

@@ -21,8 +21,7 @@ static void stream_floats(float* to, const float* from, size_t count) {
 
 static void put_anywhere(const float* points, size_t first, size_t count, const uint32_t* slot, float* to) {
     if (slot)
-        for (size_t k = 0; k < count; ++k)
-            memcpy(to + 3 * (size_t)slot[first + k], points + 3 * k, 3 * sizeof(float));
+        for (size_t k = 0; k < count; ++k) memcpy(to + 3 * (size_t)slot[first + k], points + 3 * k, 3 * sizeof(float));
     else
         stream_floats(to + 3 * first, points, 3 * count);
 }
