@@ -200,10 +200,11 @@ private:
 
     void report_bytes(const std::string& path, std::uint64_t bytes, Report& report) const {
         const double times = double(cache_bytes_) / double(bytes);
-        report.row(path,
-                   fmt::format("{} bytes, {}", with_commas(bytes),
-                               times >= 1 ? fmt::format("{:.3g} times smaller than the positions of all frames", times)
-                                          : std::string("larger than the positions of all frames")));
+        report.row(path, fmt::format("{} bytes, {}", with_commas(bytes),
+                                     times >= 1 ? fmt::format("{} times smaller than the positions of all frames",
+                                                              times >= 100 ? with_commas(std::uint64_t(times))
+                                                                           : fmt::format("{:.3g}", times))
+                                                : std::string("larger than the positions of all frames")));
         report.set("bytes", bytes);
         report.set("times_smaller", times);
     }

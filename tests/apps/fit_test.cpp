@@ -128,7 +128,7 @@ TEST_F(FitCommand, BadInputsGetOneSentence) {
     fails(2, {"fit", "flag.pc2", "--mesh", "rest.obj", "--compress", "-o", "out.fil"}, {"--compress", ".glb"});
     fails(3, {"fit", "none.pc2", "--mesh", "rest.obj", "-o", "out.fil"}, {"none.pc2"});
     fails(5, {"fit", "cloth.abc", "-o", "out.fil"}, {"Alembic", ".pc2"});
-    ASSERT_TRUE(write_mesh(sheet(10, 10), path("other.obj")).ok());
+    ASSERT_TRUE(write_mesh(filigree_test::sheet(10, 10), path("other.obj")).ok());
     fails(8, {"fit", "flag.pc2", "--mesh", "other.obj", "-o", "out.fil"}, {"flag.pc2", "121"});
     ok({"strip", "rest.obj", "-o", "still.fil"});
     fails(7, {"fit", "still.fil", "-o", "out.fil"}, {"no poses"});
