@@ -297,6 +297,9 @@ void run(FitArguments options, Session& session) {
     check(options, session);
     Input input;
     open_input(options, session, input);
+    if (options.rest > input.animation.frames)
+        refuse(
+            fmt::format("--rest {}: {} has the frames 1 to {}.", options.rest, options.input, input.animation.frames));
     if (options.rest > 0)
         options.fit.rest_frame = options.rest - 1;
     else if (input.needs_rest)

@@ -211,7 +211,7 @@ Status FitWork::prepare() {
     if (!family) return family.error();
     family_.emplace(std::move(*family));
     sample_.emplace(*family_);
-    most_ = std::max(work_.surface.place_count / kMostShare, std::min(work_.surface.place_count, kSmallMesh));
+    most_ = std::min(work_.surface.place_count, std::max(mesh_.vertex_count() / kMostShare, kSmallMesh));
     const std::size_t any = std::min(family_->most_vertices(), kMostDriver);
     most_ = std::min(most_, any);
     if (options_.base && *options_.base > any)
