@@ -169,9 +169,13 @@ TEST(Fit, CopiesThatStayTogetherAreOne) {
     const Fitted fitted = fit_animation(made.animation, {.error = 1e-4}).value();
     EXPECT_EQ(fitted.report.parted, 0u);
     EXPECT_LT(fitted.report.driver_vertices, 130u);
-    // A cache has all 3,600 vertices, so a driver of all 651 places is smaller still.
-    EXPECT_EQ(fit_animation(made.animation, {.error = 1e-7}).value().report.driver_vertices, 651u);
-    EXPECT_LE(measure(fitted, made.animation).rms, 1e-4);
+    // A cache has all 3,600 vertices, so a driver of more than a quarter of the 651 places is smaller still.
+    const MadeAnimation rough = animate(split, 4, [places = places_of(split)](std::size_t frame) {
+        std::vector<Vec3d> moved = places;
+        for (Vec3d& p : moved) p.z() += 0.01 * std::sin(1e5 * (p.x() + 0.37) * (p.y() + 0.61) + 2 * double(frame));
+        return moved;
+    });
+    EXPECT_GT(fit_animation(rough.animation).value().report.driver_vertices, 400u);
 }
 
 TEST(Fit, AFrameMayBeTheRest) {
