@@ -107,10 +107,8 @@ double kilobytes(const fs::path& path) { return double(fs::file_size(path)) / 10
 
 void write(const MadeAnimation& made, const std::string& name, const fs::path& folder) {
     fs::create_directories(folder);
-    for (const Status& status :
-         {write_mesh(*made.rest, folder / (name + ".obj")).ok() ? Status(Success{}) : Error{},
-          write_animation(made.animation, folder / (name + ".pc2")).ok() ? Status(Success{}) : Error{}})
-        if (!status) std::exit(1);
+    (void)write_mesh(*made.rest, folder / (name + ".obj")).value();
+    (void)write_animation(made.animation, folder / (name + ".pc2")).value();
 }
 
 void run(const std::string& name, const Options& options) {

@@ -14,6 +14,7 @@
 
 #include "filigree/context.h"
 #include "filigree/file.h"
+#include "filigree/fit.h"
 #include "filigree/mesh.h"
 #include "filigree/pack.h"
 #include "filigree/pose.h"

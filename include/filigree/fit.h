@@ -77,11 +77,11 @@ Result<AnimationError> animation_error(const Model& model, const PoseSequence& p
 /// Finds the smallest driver whose restored mesh follows an animation within an error, and its poses by least squares.
 /// The mesh of the model is the animation's, at rest, and keeps its order. The error is measured on every vertex of
 /// every frame as Restorer gives it. A driver has 20,000 vertices at most, and a quarter of the mesh's (64 where the
-/// mesh is smaller than that). Results are the same to the byte for any number of threads. Cost: about four passes
-/// over the frames, O(V) each; a pass of 120 frames of 440,000 vertices takes about 6 processor seconds. Memory: the
-/// mesh, a frame, 12 numbers a driver vertex and frame. Errors: usage (options that make no sense; check_mesh refuses
-/// the mesh), unsuitable (no frames, no faces; a frame that is not finite, or of another order; the error is not
-/// reached: the sentence says what is), out_of_memory, cancelled, and those of the animation.
+/// mesh is smaller than that). Results are the same to the byte for any number of threads. Cost: three
+/// passes over the frames or a few more, O(V) each: about 8 processor seconds for 120 frames of 440,000 vertices.
+/// Memory: the mesh, a frame, 12 numbers a driver vertex and frame. Errors: usage (options that make no sense;
+/// check_mesh refuses the mesh), unsuitable (no frames, no faces; a frame that is not finite, or of another order; the
+/// error is not reached: the sentence says what is), out_of_memory, cancelled, and those of the animation.
 Result<Fitted> fit_animation(const MeshAnimation& animation, const FitOptions& options = {},
                              const RunContext& context = RunContext());
 
