@@ -64,11 +64,6 @@ TEST(DenseSolve, SolvesWhatItIsGiven) {
     EXPECT_LT((definite * solve_semidefinite(definite, right) - right).norm(), 1e-12);
     const Eigen::MatrixXd solved = solve_semidefinite(Eigen::MatrixXd(definite), Eigen::MatrixXd(right));
     EXPECT_LT((definite * Vec3d(solved) - right).norm(), 1e-12);
-
-    Eigen::MatrixXd saddle = Eigen::MatrixXd::Zero(4, 4); // nothing on the diagonal: rows have to be exchanged
-    saddle << 0, 1, 0, 2, 3, 0, 1, 0, 0, 0, 0, 1, 1, 0, 5, 0;
-    const Eigen::MatrixXd two = Eigen::MatrixXd::Identity(4, 2);
-    EXPECT_LT((saddle * solve_general(saddle, two) - two).norm(), 1e-12);
 }
 
 } // namespace
