@@ -601,7 +601,7 @@ TEST_F(Cli, AFileThatMayNotGrowIsRemoved) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) // sanitizers want far more address space
 TEST_F(Cli, LittleAddressSpaceIsOutOfMemory) {
     make_cube(32);
-    for (const int kilobytes : {80'000, 100'000, 150'000}) { // the first has no room for threads
+    for (const int kilobytes : {40'000, 60'000, 80'000}) { // the first has no room for threads
         const Ran ran = run_shell("ulimit -v " + std::to_string(kilobytes) +
                                   "; exec \"$0\" remesh cube.obj -o quads.ply --threads 8");
         if (ran.code == 127) continue; // not even for the program's libraries
