@@ -124,7 +124,8 @@ TEST_F(GltfExport, CubicKeysComeCloserWhereKeysAreSparse) {
     // The largest error is where two singular values cross between keys, which no interpolation of rotations follows.
     EXPECT_LT(cubic.error_between_keys, linear.error_between_keys / 2);
     EXPECT_LT(cubic.rms_between_keys, linear.rms_between_keys / 8);
-    EXPECT_LT(cubic.error_at_keys, 1e-6); // cubic keys are floats: two rotations, a scale and a place, rounded to 6e-8 each
+    EXPECT_LT(cubic.error_at_keys,
+              1e-6); // cubic keys are floats: two rotations, a scale and a place, rounded to 6e-8 each
 }
 
 TEST_F(GltfExport, TheLastFrameIsAKeyAtAnyRate) {

@@ -35,8 +35,7 @@ public:
             if (a == b) return false;
             if (a > b) std::swap(a, b);
             Index expected = b;
-            if (atomic_ref(parent_[b]).compare_exchange_strong(expected, a, std::memory_order_relaxed))
-                return true;
+            if (atomic_ref(parent_[b]).compare_exchange_strong(expected, a, std::memory_order_relaxed)) return true;
         }
     }
 

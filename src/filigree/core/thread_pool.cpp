@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <condition_variable>
+#include <cstddef>
 #include <exception>
 #include <mutex>
+#include <new>
 #include <thread>
 
 #if defined(__linux__)
@@ -94,17 +96,18 @@ private:
 
 class Pool {
 public:
-    /// Never destroyed, as helpers outlive static objects. A child of fork() has no helpers, and makes a pool of its
-    /// own.
+    /// Never destroyed, as helpers outlive static objects. Made without memory: a loop then runs on its caller alone. A
+    /// child of fork() has no helpers, and begins anew.
     static Pool& instance() {
+        alignas(Pool) static std::byte room[sizeof(Pool)];
         [[maybe_unused]] static const bool made = [] {
 #if defined(__unix__) || defined(__APPLE__)
-            ::pthread_atfork(nullptr, nullptr, [] { the_pool = new Pool; });
+            ::pthread_atfork(nullptr, nullptr, [] { new (room) Pool; });
 #endif
-            the_pool = new Pool;
+            new (room) Pool;
             return true;
         }();
-        return *the_pool;
+        return *std::launder(reinterpret_cast<Pool*>(room));
     }
 
     void open(Loop& loop, unsigned helpers) {
@@ -166,14 +169,12 @@ private:
         sleeping_.fetch_sub(1);
     }
 
-    static Pool* the_pool;
     std::mutex mutex_;
     std::condition_variable wake_;
     Loop* first_ = nullptr; ///< the loop that was opened last
     unsigned started_ = 0;
     std::atomic<unsigned> opened_ = 0, sleeping_ = 0;
 };
-Pool* Pool::the_pool = nullptr;
 
 } // namespace
 

@@ -65,7 +65,8 @@ Vec3d value_noise(const Vec3d& point, std::uint64_t seed, Mat3d* gradient) {
 CrackWarp::CrackWarp(const CrackWarpOptions& options) : centre_(options.box.centre()), seed_(options.seed) {
     if (options.roughness > 0) {
         double bending = 0;
-        for (int octave = 0; octave < kOctaves; ++octave) bending += kSteepest * math::exp2(double(octave)) * gain_of(octave);
+        for (int octave = 0; octave < kOctaves; ++octave)
+            bending += kSteepest * math::exp2(double(octave)) * gain_of(octave);
         const double amplitude = options.roughness * kMostBending / bending * options.wavelength;
         frequency_ = 1 / options.wavelength;
         for (int octave = 0; octave < kAllOctaves; ++octave)
