@@ -9,6 +9,8 @@
 #include "filigree/pack.h"
 #include "filigree/pose.h"
 
+#include "spent.h"
+
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -16,7 +18,6 @@
 #include <optional>
 #include <string>
 
-#include <sys/resource.h>
 #include <unistd.h>
 
 namespace {
@@ -87,21 +88,7 @@ std::optional<MadeAnimation> make(const std::string& name, const Options& option
     return std::nullopt;
 }
 
-struct Spent {
-    double wall = 0, processor = 0; ///< s
-};
-Spent now() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    const auto seconds = [](const timeval& t) { return double(t.tv_sec) + 1e-6 * double(t.tv_usec); };
-    return {std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(),
-            seconds(usage.ru_utime) + seconds(usage.ru_stime)};
-}
-double peak_megabytes() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    return double(usage.ru_maxrss) / 1024;
-}
+double peak_megabytes() { return peak_bytes() / double(1 << 20); }
 
 double kilobytes(const fs::path& path) { return double(fs::file_size(path)) / 1000; }
 

@@ -9,6 +9,8 @@
 #include "filigree/pose.h"
 #include "filigree/restore.h"
 
+#include "spent.h"
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -19,31 +21,13 @@
 #include <random>
 #include <string_view>
 
-#include <sys/resource.h>
-
 namespace {
 
 using namespace filigree;
 
 constexpr std::size_t kNever = std::numeric_limits<std::size_t>::max();
 
-struct Spent {
-    double wall = 0, processor = 0; ///< s
-};
-
-Spent now() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    const auto seconds = [](const timeval& t) { return double(t.tv_sec) + 1e-6 * double(t.tv_usec); };
-    return {std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(),
-            seconds(usage.ru_utime) + seconds(usage.ru_stime)};
-}
-
-double peak_gib() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    return double(usage.ru_maxrss) / (1 << 20);
-}
+double peak_gib() { return peak_bytes() / double(1 << 30); }
 
 Stripped stripped(Mesh mesh, std::size_t one_piece, std::size_t base = 1000) {
     StripOptions options;

@@ -4,6 +4,8 @@
 #include "filigree/io/system/extension.h"
 #include "filigree/io/system/numbered_name.h"
 
+#include <algorithm>
+
 namespace filigree::cli {
 
 namespace {
@@ -40,8 +42,10 @@ std::vector<std::string> draw_demo(const DemoScene&, const std::function<Pose(do
     return {};
 }
 
-/// Textures are pictures too.
-std::vector<BodyLook> looks_of_bodies(const ReadyScene& ready, Session&) {
+std::vector<BodyLook> looks_of_bodies(const ReadyScene& ready, Session& session) {
+    const auto has_materials = [](const ReadyBody& body) { return !body.model.mesh.materials.names.empty(); };
+    if (std::ranges::any_of(ready.bodies, has_materials))
+        session.warn("Textures of melting bodies are left out: this program was built without the renderer.");
     return std::vector<BodyLook>(ready.bodies.size());
 }
 

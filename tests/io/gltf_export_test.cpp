@@ -124,8 +124,9 @@ TEST_F(GltfExport, CubicKeysComeCloserWhereKeysAreSparse) {
     // The largest error is where two singular values cross between keys, which no interpolation of rotations follows.
     EXPECT_LT(cubic.error_between_keys, linear.error_between_keys / 2);
     EXPECT_LT(cubic.rms_between_keys, linear.rms_between_keys / 8);
-    EXPECT_LT(cubic.error_at_keys,
-              1e-6); // cubic keys are floats: two rotations, a scale and a place, rounded to 6e-8 each
+    // Cubic keys are floats, so at most: two rotations by 1.2e-7 each, a scale by 6e-8, a place and its inverse at rest
+    // by 1e-7 to 2e-7 each. Which part of that is reached depends on the roundings of the singular values.
+    EXPECT_LT(cubic.error_at_keys, 1e-6);
 }
 
 TEST_F(GltfExport, TheLastFrameIsAKeyAtAnyRate) {

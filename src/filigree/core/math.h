@@ -1,8 +1,7 @@
 // Sine, exponential and the like with the same bits on every processor, compiler and operating system.
 // The standard library's functions differ between systems in their last bits, and IEEE 754 leaves them free. These use
-// additions, multiplications, divisions and square roots alone, in a written order. They are right to 2 units in the
-// last place (pow: 3), and as fast as the standard library's. Layers below `render` call no others; scripts/layers
-// looks.
+// additions, multiplications, divisions and square roots alone, in a written order. They are right to 3 units in the
+// last place, and slower than glibc's. Layers below `render` call no others; scripts/layers looks.
 #pragma once
 
 #include <Eigen/Geometry>

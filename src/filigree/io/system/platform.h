@@ -1,5 +1,5 @@
-// The one place that asks the operating system: files, locks, folders, random bytes, memory, the console. POSIX calls
-// their equals in platform_posix.cpp; platform_windows.cpp has the same for Windows.
+// What files and programs ask of the operating system: files, locks, folders, random bytes, memory, the console. POSIX
+// calls their equals in platform_posix.cpp; platform_windows.cpp has the same for Windows.
 //
 // Descriptors are those of the C library. What fails returns -1 or an error number of <cerrno>, on Windows too.
 #pragma once
