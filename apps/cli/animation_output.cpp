@@ -16,13 +16,13 @@ namespace fs = std::filesystem;
 /// Where numbered meshes go: into a folder under the input's name, or as the path says.
 std::string numbered_path(const std::string& path, const std::string& input) {
     std::error_code ignored;
-    if (!path.ends_with('/') && !fs::is_directory(path, ignored)) return path;
-    return (fs::path(path) / (fs::path(input).stem().string() + "_####.ply")).string();
+    if (!path.ends_with('/') && !fs::is_directory(path_of(path), ignored)) return path;
+    return (path_of(path) / (path_of(input).stem().string() + "_####.ply")).string();
 }
 
 std::size_t bytes_of_file(const std::string& path) {
     std::error_code failed;
-    const auto bytes = fs::file_size(path, failed);
+    const auto bytes = fs::file_size(path_of(path), failed);
     return failed ? 0 : bytes;
 }
 
@@ -140,16 +140,16 @@ std::string given_animation_option(const Session& session) {
                                 "--all-levels", "--compress", "--no-normals", "--morph-normals"});
 }
 
-bool is_animation_path(const std::string& path) { return animation_format(path).ok(); }
+bool is_animation_path(const std::string& path) { return animation_format(path_of(path)).ok(); }
 
 void check_animation_path(const std::string& path) {
     if (path == "-") refuse("An animation cannot go to standard output; give -o a file or a folder.");
-    if (require(animation_format(path)) != AnimationFormat::numbered) check_folder_of(path);
+    if (require(animation_format(path_of(path))) != AnimationFormat::numbered) check_folder_of(path);
 }
 
 void check_animation_options(const std::vector<std::string>& paths, const Session& session) {
     const auto is_glb = [](const std::string& path) {
-        const Result<AnimationFormat> format = animation_format(path);
+        const Result<AnimationFormat> format = animation_format(path_of(path));
         return format && *format == AnimationFormat::glb;
     };
     const std::string given = given_animation_option(session);
@@ -165,7 +165,7 @@ void check_not_input(const std::string& output, const std::vector<std::string>& 
         return std::pair(status->device, status->number);
     };
     for (const std::string& input : inputs)
-        for (const fs::path& path : animation_files(input))
+        for (const fs::path& path : animation_files(path_of(input)))
             if (const auto file = file_of(path)) taken.insert(*file);
     for (const fs::path& path : animation_files(numbered_path(output, inputs.front()))) {
         const auto file = file_of(path);
@@ -196,7 +196,7 @@ FrameSource<Pose> poses_of(const std::string& poses, const PoseFileOptions& opti
         matched.rest = rest;
         matched.warnings = &warnings;
         FrameSource<Pose> stream =
-            require(open_poses(poses, rest.size(), model.mesh.origin, matched, session.context()));
+            require(open_poses(path_of(poses), rest.size(), model.mesh.origin, matched, session.context()));
         session.warn(warnings);
         return stream;
     }
@@ -212,14 +212,14 @@ ChunkReport write_chunk_output(const Model& model, const FrameSource<Pose>& pose
     const Restorer restorer = require(Restorer::create(model, restore, session.context()));
     const Mesh rest = level_mesh(model, require(restored_level(model, restore)));
     session.begin_writing(path);
-    return require(write_animation_chunk(restored_animation(restorer, poses, rest, session.silent_context()), path,
-                                         chunk, session.context()));
+    return require(write_animation_chunk(restored_animation(restorer, poses, rest, session.silent_context()),
+                                         path_of(path), chunk, session.context()));
 }
 
 void write_chunks_output(const ModelChunks& model, const FrameSource<Pose>& poses, const RestoreOptions& restore,
                          const std::string& path, Session& session, Report& report) {
     session.begin_writing(path);
-    session.warn(require(write_restored_chunks(model, poses, restore, path, session.context())));
+    session.warn(require(write_restored_chunks(model, poses, restore, path_of(path), session.context())));
     report_size(path, bytes_of_file(path), report);
     report_frames(poses.frames, poses.frames_per_second, model.vertex_count(), report);
 }
@@ -227,16 +227,16 @@ void write_chunks_output(const ModelChunks& model, const FrameSource<Pose>& pose
 void write_animation_output(const Model& model, const FrameSource<Pose>& poses, const RestoreOptions& restore,
                             const AnimationOutput& output, const std::string& path, const std::string& materials_beside,
                             Session& session, Report& report) {
-    const AnimationFormat format = require(animation_format(path));
+    const AnimationFormat format = require(animation_format(path_of(path)));
     const bool makes_skin = output.glb != GlbMotion::morph;
     if (format == AnimationFormat::glb && makes_skin) {
         SkinOptions options = output.skin;
         if (output.no_normals) options.normals = ExportNormals::leave;
         options.compress = output.compress;
         options.restore = restore;
-        options.materials_beside = materials_beside;
+        options.materials_beside = path_of(materials_beside);
         session.begin_writing(path);
-        const ExportReport exported = require(write_skin_glb(model, poses, options, path, session.context()));
+        const ExportReport exported = require(write_skin_glb(model, poses, options, path_of(path), session.context()));
         session.warn(exported.warnings);
         report_export(exported, true, !output.no_normals, path, report);
         set_moments(poses.frames, poses.frames_per_second, report);
@@ -258,7 +258,7 @@ void write_animation_output(const Model& model, const FrameSource<Pose>& poses, 
 
 void write_animation_output(const MeshAnimation& animation, const AnimationOutput& output, const std::string& path,
                             const std::string& materials_beside, Session& session, Report& report) {
-    const AnimationFormat format = require(animation_format(path));
+    const AnimationFormat format = require(animation_format(path_of(path)));
     session.begin_writing(path);
     if (format == AnimationFormat::glb) {
         if (output.glb == GlbMotion::skin)
@@ -267,15 +267,15 @@ void write_animation_output(const MeshAnimation& animation, const AnimationOutpu
         MorphOptions options = output.morph;
         if (output.no_normals) options.normals = ExportNormals::leave;
         options.compress = output.compress;
-        options.materials_beside = materials_beside;
-        const ExportReport exported = require(write_morph_glb(animation, options, path, session.context()));
+        options.materials_beside = path_of(materials_beside);
+        const ExportReport exported = require(write_morph_glb(animation, options, path_of(path), session.context()));
         session.warn(exported.warnings);
         report_export(exported, false, !output.no_normals, path, report);
         set_moments(animation.frames, animation.frames_per_second, report);
         return;
     }
     const std::string place = format == AnimationFormat::numbered ? numbered_path(path, materials_beside) : path;
-    session.warn(require(write_animation(animation, place, session.context())));
+    session.warn(require(write_animation(animation, path_of(place), session.context())));
     if (format == AnimationFormat::numbered)
         report.set("output", path);
     else

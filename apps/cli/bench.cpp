@@ -61,13 +61,13 @@ void report_table(const bench::Table& table, Report& report) {
 }
 
 bench::NamedMesh named_mesh(const std::string& path, Session& session) {
-    return {fs::path(path).filename().string(), session.read_mesh(path)};
+    return {path_of(path).filename().string(), session.read_mesh(path)};
 }
 
 /// The meshes in a folder and the folders in it, by name. What cannot be read is left out, with a warning.
 std::vector<bench::NamedMesh> meshes_in(const std::string& folder, Session& session) {
     std::vector<std::string> paths;
-    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(path_of(folder)))
         if (entry.is_regular_file() && mesh_format(entry.path()).ok()) paths.push_back(entry.path().string());
     std::sort(paths.begin(), paths.end());
     std::vector<bench::NamedMesh> meshes;
@@ -86,7 +86,7 @@ std::vector<bench::NamedMesh> meshes_in(const std::string& folder, Session& sess
 std::vector<bench::NamedMesh> meshes_for(const BenchArguments& options, Session& session) {
     const bool many = bench::takes_many_meshes(options.measure.name);
     std::error_code ignored;
-    if (many && fs::is_directory(options.mesh, ignored)) return meshes_in(options.mesh, session);
+    if (many && fs::is_directory(path_of(options.mesh), ignored)) return meshes_in(options.mesh, session);
     std::vector<bench::NamedMesh> meshes;
     if (!options.mesh.empty())
         meshes.push_back(named_mesh(options.mesh, session));

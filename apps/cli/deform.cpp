@@ -33,7 +33,7 @@ struct DeformArguments {
 class Deformation {
 public:
     explicit Deformation(const DeformArguments& options) : options_(options) {
-        if (!options.handles.empty()) handles_ = require(read_handles(options.handles));
+        if (!options.handles.empty()) handles_ = require(read_handles(path_of(options.handles)));
     }
 
     Mesh mesh(Mesh mesh, double fraction, const RunContext& context) const {
@@ -74,7 +74,7 @@ private:
     std::vector<HandleRegion> handles_; ///< of the file; none: warps
 };
 
-bool is_model_path(const std::string& path) { return lower_extension(path) == ".fil"; }
+bool is_model_path(const std::string& path) { return lower_extension(path_of(path)) == ".fil"; }
 
 void check(const DeformArguments& options, const Session& session) {
     check_second_output("--pose", options.pose_output, options.output);

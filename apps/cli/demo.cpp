@@ -61,7 +61,7 @@ struct DemoArguments {
 void run_demo(const DemoArguments& options, Session& session) {
     const auto& [input, folder, no_pictures, asked_up] = options;
     const RunContext& context = session.context();
-    OutputFolder files(folder, input);
+    OutputFolder files(path_of(folder), path_of(input));
     const std::string model_file = files.file("model.fil"), mesh_file = files.file("mesh.ply"),
                       driver_file = files.file("driver.ply"), posed_driver_file = files.file("driver_bent.ply"),
                       full_file = files.file("full_deformation.ply"), restored_file = files.file("restored.ply"),

@@ -66,13 +66,13 @@ void draw_demo_panels(const DemoScene& scene, HeadlessRenderer& renderer, const 
     page.legend(ColorMap::sequential, errors.range, "distance / diagonal", {page.width() - kLegend + 14, 20},
                 kPanelHeight - 30.0);
     if (context.is_cancelled()) throw Failure{cancelled_error()};
-    require(page.write(path, kPixels));
+    require(page.write(path_of(path), kPixels));
 }
 
 void film_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_at, HeadlessRenderer& renderer,
                const std::string& path, Session& session) {
     const RunContext& context = session.context();
-    FilmWriter writer = require(FilmWriter::create(path, kFilmWidth, kFilmHeight, 30));
+    FilmWriter writer = require(FilmWriter::create(path_of(path), kFilmWidth, kFilmHeight, 30));
     const RestoreOptions restore{.level = level_within(scene.model, kMostFilmTriangles)};
     Drawable drawable = require(Drawable::model(scene.model, restore, {}, context));
 

@@ -20,14 +20,14 @@ namespace filigree::cli {
 std::vector<Command> drawing_commands() { return {render_command(), figures_command()}; }
 
 void check_picture_path(const std::string& path) {
-    const std::string ending = lower_extension(path);
+    const std::string ending = lower_extension(path_of(path));
     if (ending != ".png" && ending != ".svg" && ending != ".pdf")
         refuse(ErrorCode::unsupported, path + ": is no picture's name; let it end in .png, .svg or .pdf.");
     check_folder_of(path);
 }
 
 void check_png_path(const std::string& path) {
-    if (lower_extension(path) != ".png")
+    if (lower_extension(path_of(path)) != ".png")
         refuse(ErrorCode::unsupported, path + ": the picture is a PNG; let its name end in .png.");
     check_picture_path(path);
 }
@@ -40,7 +40,7 @@ Camera camera_for(const Mesh& mesh, View view, UpAxis up, double aspect, double 
 
 void write_picture(const Picture& picture, const std::string& path, Session& session) {
     if (session.context().is_cancelled()) throw Failure{cancelled_error()};
-    require(write_file(path, encode_png(picture)));
+    require(write_file(path_of(path), encode_png(picture)));
 }
 
 void write_picture_of(const Scene& scene, const Camera& camera, const PictureOptions& options, const std::string& path,
@@ -130,7 +130,7 @@ std::vector<BodyLook> looks_of_bodies(const ReadyScene& ready, Session& session)
     return looks;
 }
 
-bool is_film(const std::string& path) { return is_film_path(path); }
+bool is_film(const std::string& path) { return is_film_path(path_of(path)); }
 
 struct SceneFilms::Films {
     std::vector<std::string> paths;
@@ -142,7 +142,8 @@ SceneFilms::SceneFilms(const std::vector<std::string>& paths, const SceneFile& s
     : films_(new Films{paths, require(HeadlessRenderer::create()), {}}) {
     const auto& [width, height] = scene.picture.size;
     for (const std::string& path : paths)
-        films_->writers.push_back(require(FilmWriter::create(path, width, height, scene.step.frames_per_second)));
+        films_->writers.push_back(
+            require(FilmWriter::create(path_of(path), width, height, scene.step.frames_per_second)));
 }
 SceneFilms::~SceneFilms() = default;
 

@@ -34,7 +34,8 @@ struct ExportArguments {
 
 /// Levels at rest, one beside the other.
 void export_levels(const Model& model, const ExportArguments& options, Session& session, Report& report) {
-    if (const AnimationFormat format = require(animation_format(options.output)); format != AnimationFormat::glb)
+    if (const AnimationFormat format = require(animation_format(path_of(options.output)));
+        format != AnimationFormat::glb)
         refuse(ErrorCode::unsuitable,
                options.input + (options.at_rest ? ": a" : ": has no poses, and a") +
                    " model at rest goes to .glb, or with --web to a folder with a page; 'filigree simulate' makes "
@@ -46,8 +47,8 @@ void export_levels(const Model& model, const ExportArguments& options, Session& 
         refuse(given + " belongs to a model that moves, and " + options.input +
                " is exported at rest; 'filigree level' writes one level of it.");
     session.begin_writing(options.output);
-    session.warn(require(write_levels_glb(model, options.output, options.input, session.context())));
-    const auto bytes = fs::file_size(options.output);
+    session.warn(require(write_levels_glb(model, path_of(options.output), path_of(options.input), session.context())));
+    const auto bytes = fs::file_size(path_of(options.output));
     report.set("vertices", model.vertex_count());
     report.add("levels", fmt::format("{}, as MSFT_lod", model.finest_level() + 1), "levels", model.finest_level() + 1);
     report.count("bytes", "bytes", bytes);
@@ -55,8 +56,8 @@ void export_levels(const Model& model, const ExportArguments& options, Session& 
 
 /// A moving file of another program, frame by frame, as another format.
 void convert_animation(const Mesh& rest, const ExportArguments& options, Session& session, Report& report) {
-    const bool may_move =
-        !options.poses.empty() || lower_extension(options.input) == ".glb" || lower_extension(options.input) == ".gltf";
+    const bool may_move = !options.poses.empty() || lower_extension(path_of(options.input)) == ".glb" ||
+                          lower_extension(path_of(options.input)) == ".gltf";
     if (!may_move)
         refuse(ErrorCode::unsuitable, options.input + ": is a mesh that does not move; --poses FILE moves it, and "
                                                       "'filigree strip' makes a model of it.");
@@ -66,8 +67,8 @@ void convert_animation(const Mesh& rest, const ExportArguments& options, Session
         matched.rest = rest.positions;
         matched.warnings = &warnings;
     }
-    const MeshAnimation animation = require(
-        open_animation(options.poses.empty() ? options.input : options.poses, rest, matched, session.context()));
+    const MeshAnimation animation = require(open_animation(
+        path_of(options.poses.empty() ? options.input : options.poses), rest, matched, session.context()));
     session.warn(warnings);
     check_animation_options({options.output}, session);
     write_animation_output(animation, options.animation, options.output, options.input, session, report);
@@ -85,7 +86,7 @@ void export_model(const Model& model, const PoseSequence& own, const ExportArgum
 
 /// What a page can show of the materials beside a model: PNG and JPEG, in the file.
 std::vector<MeshMaterial> page_materials(const Mesh& mesh, const std::string& input, Session& session) {
-    MeshMaterials found = read_materials_and_pictures(mesh, input);
+    MeshMaterials found = read_materials_and_pictures(mesh, path_of(input));
     for (MeshMaterial& material : found.materials) {
         if (!material.picture_bytes || !picture_extension(*material.picture_bytes).empty()) continue;
         found.warnings.push_back("The texture of " + material.name + " is neither PNG nor JPEG and was left out.");
@@ -116,13 +117,13 @@ void export_stream(const Model& model, const PoseSequence& own, const ExportArgu
     session.begin_writing(options.output);
     const PackReport coding =
         require(pack_model(embedding ? *embedding : model, poses, {.bits = options.bits, .levels = true},
-                           options.output, session.context()));
-    const auto bytes = fs::file_size(options.output);
+                           path_of(options.output), session.context()));
+    const auto bytes = fs::file_size(path_of(options.output));
     report.set("vertices", model.vertex_count());
     report.count("frames", "frames", poses.frames.size());
     report.count("bytes", "bytes", bytes);
     add_coding_shares(coding.bytes, model.vertex_count(), bytes, report);
-    const FileReader file = require(FileReader::open(options.output));
+    const FileReader file = require(FileReader::open(path_of(options.output)));
     add_stream_marks(require(read_model_outline(file, options.output, session.silent_context())), report);
     if (coding.lacks_level_attributes) session.warn(kLevelsLackAttributes);
 }
@@ -144,13 +145,13 @@ void export_glb_page(const ExportArguments& options, const std::string& glb, Ses
         refuse(ErrorCode::unsuitable, options.input + ": needs the file '" + scene.files_beside().front() +
                                           "' beside it, and the page shows a GLB that holds all of its parts.");
     session.warn(scene.warnings());
-    OutputFolder folder(options.output, options.input);
-    WebPage page(folder, fs::path(options.input).stem().string(), WebModel::glb);
+    OutputFolder folder(path_of(options.output), path_of(options.input));
+    WebPage page(folder, path_of(options.input).stem().string(), WebModel::glb);
     session.begin_writing(options.output);
-    require(write_file(page.model_path(), glb));
+    require(write_file(path_of(page.model_path()), glb));
     page.write(session);
     folder.keep();
-    const std::string index = (fs::path(options.output) / "index.html").string();
+    const std::string index = (path_of(options.output) / "index.html").string();
     report.count("bytes", "bytes", glb.size());
     report.add("page", index, "page", index);
 }
@@ -159,9 +160,9 @@ void export_glb_page(const ExportArguments& options, const std::string& glb, Ses
 void export_page(const Model& model, const PoseSequence& own, ExportArguments options, Session& session,
                  Report& report) {
     const std::string folder_name = options.output;
-    OutputFolder folder(folder_name, options.input);
-    folder.protect(animation_files(options.poses));
-    WebPage page(folder, fs::path(options.input).stem().string(), options.stream ? WebModel::stream : WebModel::glb);
+    OutputFolder folder(path_of(folder_name), path_of(options.input));
+    folder.protect(animation_files(path_of(options.poses)));
+    WebPage page(folder, path_of(options.input).stem().string(), options.stream ? WebModel::stream : WebModel::glb);
     options.output = page.model_path();
     options.animation.skin.all_levels = true;
     if (options.stream)
@@ -170,7 +171,7 @@ void export_page(const Model& model, const PoseSequence& own, ExportArguments op
         export_model(model, own, options, session, report);
     page.write(session);
     folder.keep();
-    const std::string index = (fs::path(folder_name) / "index.html").string();
+    const std::string index = (path_of(folder_name) / "index.html").string();
     report.set("output", folder_name);
     report.add("page", index, "page", index);
 }

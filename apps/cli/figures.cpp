@@ -63,7 +63,7 @@ std::optional<Mesh> read_scan(const FiguresArguments& options, Session& session)
 void run_figures(const FiguresArguments& options, Session& session) {
     const RunContext& context = session.context();
     const std::vector<FigureEntry> chosen = chosen_figures(options.only);
-    OutputFolder folder(options.output);
+    OutputFolder folder(path_of(options.output));
     std::vector<std::string> paths;
     for (const FigureEntry& figure : chosen)
         paths.push_back(folder.file(file_stem(figure.name) + "." + options.format));
@@ -81,7 +81,7 @@ void run_figures(const FiguresArguments& options, Session& session) {
     Json figures = Json::array();
     for (std::size_t i = 0; i < chosen.size(); ++i) {
         session.begin_writing(paths[i]);
-        require(drawn[i].page.write(paths[i], scale));
+        require(drawn[i].page.write(path_of(paths[i]), scale));
         report.row(chosen[i].name, fmt::format("{}  ({})", paths[i], chosen[i].title));
         figures.push_back(
             {{"name", chosen[i].name}, {"file", paths[i]}, {"values", Json::parse(drawn[i].values.dump()).value()}});

@@ -40,16 +40,16 @@ struct FitArguments {
     bool rounds() const { return profile == FitProfile::compact || profile == FitProfile::stream; }
 };
 
-bool is_fil_path(const std::string& path) { return lower_extension(path) == ".fil"; }
+bool is_fil_path(const std::string& path) { return lower_extension(path_of(path)) == ".fil"; }
 bool is_page(const std::string& path, const FitArguments& options) {
-    return options.web && !is_fil_path(path) && require(animation_format(path)) == AnimationFormat::numbered;
+    return options.web && !is_fil_path(path) && require(animation_format(path_of(path))) == AnimationFormat::numbered;
 }
 
 void check(const FitArguments& options, const Session& session) {
     for (std::size_t k = 0; k < options.outputs.size(); ++k) {
         const std::string& path = options.outputs[k];
         for (std::size_t before = 0; before < k; ++before)
-            if (fs::path(path).lexically_normal() == fs::path(options.outputs[before]).lexically_normal())
+            if (path_of(path).lexically_normal() == path_of(options.outputs[before]).lexically_normal())
                 refuse(path + ": two outputs cannot go to one place.");
         if (is_fil_path(path))
             check_folder_of(path);
@@ -81,7 +81,7 @@ struct Input {
 
 /// The first mesh of a sequence, for its faces.
 Mesh first_mesh(const std::string& path, Session& session) {
-    const std::vector<fs::path> files = animation_files(path);
+    const std::vector<fs::path> files = animation_files(path_of(path));
     if (files.empty()) refuse(ErrorCode::not_found, path + ": has no meshes.");
     std::vector<std::pair<std::uint64_t, fs::path>> numbered;
     for (const fs::path& file : files) {
@@ -106,10 +106,10 @@ void open_model_animation(const FitArguments& options, Session& session, Input& 
 }
 
 void open_input(const FitArguments& options, Session& session, Input& input) {
-    const std::string extension = lower_extension(options.input);
+    const std::string extension = lower_extension(path_of(options.input));
     const bool is_gltf_file = extension == ".glb" || extension == ".gltf";
     std::error_code ignored;
-    const bool is_sequence = numbered_name(options.input) || fs::is_directory(options.input, ignored);
+    const bool is_sequence = numbered_name(path_of(options.input)) || fs::is_directory(path_of(options.input), ignored);
     if (!is_sequence && extension == ".fil" && options.mesh.empty())
         return open_model_animation(options, session, input);
     PoseFileOptions file = options.pose_file;
@@ -124,7 +124,7 @@ void open_input(const FitArguments& options, Session& session, Input& input) {
         input.rest = first_mesh(options.input, session);
         input.needs_rest = true;
     } else if (is_gltf_file) {
-        const GltfScene scene = require(GltfScene::read(options.input, session.context()));
+        const GltfScene scene = require(GltfScene::read(path_of(options.input), session.context()));
         session.warn(scene.warnings());
         input.rest = scene.mesh();
         input.joints = scene.joint_count();
@@ -134,12 +134,13 @@ void open_input(const FitArguments& options, Session& session, Input& input) {
     } else {
         refuse(options.input + ": has positions alone; --mesh FILE gives the mesh that it moves.");
     }
-    input.animation = require(open_animation(options.input, input.rest, file, session.context()));
+    input.animation = require(open_animation(path_of(options.input), input.rest, file, session.context()));
     session.warn(warnings);
     if (options.mesh.empty() || file.warnings || input.animation.frames == 0) return;
     std::vector<Vec3f> first(input.rest.vertex_count()); // caches of programs with another axis up lie on their faces
     require(input.animation.positions(0, first));
-    if (const std::string turned = turned_first_frame(input.rest.positions, first, input.rest.origin, options.input);
+    if (const std::string turned =
+            turned_first_frame(input.rest.positions, first, input.rest.origin, path_of(options.input));
         !turned.empty())
         session.warn(turned);
 }
@@ -166,7 +167,7 @@ std::string error_text(double rms, double max, std::size_t frame, Index vertex) 
 }
 
 std::uint64_t bytes_at(const std::string& path) {
-    return fs::is_regular_file(path) ? std::uint64_t(fs::file_size(path)) : 0;
+    return fs::is_regular_file(path_of(path)) ? std::uint64_t(fs::file_size(path_of(path))) : 0;
 }
 
 class FitOutputs {
@@ -213,7 +214,7 @@ private:
         if (options_.profile == FitProfile::plain) return session_.write_model(fitted_.model, path, fitted_.poses);
         session_.begin_writing(path);
         if (options_.profile == FitProfile::lossless) {
-            require(pack_model_lossless(fitted_.model, fitted_.poses, path, session_.context()));
+            require(pack_model_lossless(fitted_.model, fitted_.poses, path_of(path), session_.context()));
             return;
         }
         PackOptions pack;
@@ -221,7 +222,8 @@ private:
         pack.keep_order = options_.keep_order;
         pack.bits = options_.bits.value_or(bits_for(options_.fit.error, fitted_.model.mesh));
         pack.clip_error = options_.fit.base ? pack.clip_error : kShareOfPoses * options_.fit.error;
-        const PackReport packed = require(pack_model(fitted_.model, fitted_.poses, pack, path, session_.context()));
+        const PackReport packed =
+            require(pack_model(fitted_.model, fitted_.poses, pack, path_of(path), session_.context()));
         measure_packed(path, packed, pack, report);
     }
 
@@ -247,8 +249,8 @@ private:
     }
 
     void write_page(const std::string& path, Report& report) {
-        OutputFolder folder(path, options_.input);
-        WebPage page(folder, fs::path(options_.input).stem().string(), WebModel::glb);
+        OutputFolder folder(path_of(path), path_of(options_.input));
+        WebPage page(folder, path_of(options_.input).stem().string(), WebModel::glb);
         AnimationOutput animation = options_.animation;
         animation.skin.all_levels = true;
         write_animation_output(fitted_.model, frames_of(fitted_.poses), {}, animation, page.model_path(),
@@ -256,8 +258,8 @@ private:
         const std::uint64_t bytes = bytes_at(page.model_path());
         page.write(session_);
         folder.keep();
-        report_bytes((fs::path(path) / "model.glb").string(), bytes, report);
-        const std::string index = (fs::path(path) / "index.html").string();
+        report_bytes((path_of(path) / "model.glb").string(), bytes, report);
+        const std::string index = (path_of(path) / "index.html").string();
         report.add("page", index, "page", index);
     }
 

@@ -26,7 +26,7 @@ void check(const FractureArguments& options) {
         refuse(fmt::format("--at takes a point X,Y,Z each time it is given, and there are {} numbers.",
                            options.at.size()));
     if (!is_folder(options.output))
-        require(with_hint(mesh_format(options.output), ErrorCode::unsupported,
+        require(with_hint(mesh_format(path_of(options.output)), ErrorCode::unsupported,
                           "Or end the name in '/' (" + options.output + "/) for a file a piece."));
 }
 
@@ -90,9 +90,9 @@ void fit_to_format(MeshFormat format, const Mesh& input, Mesh& mesh) {
 /// A file a piece, together or not at all.
 void write_folder(const FracturedMesh& fractured, const Mesh& input, const FractureArguments& options, Session& session,
                   Report& report) {
-    const std::string extension = std::filesystem::path(options.input).extension().string();
+    const std::string extension = path_of(options.input).extension().string();
     const MeshFormat format = require(mesh_format("piece" + extension));
-    OutputFolder folder(options.output, options.input);
+    OutputFolder folder(path_of(options.output), path_of(options.input));
     std::vector<std::string> files;
     for (Index p = 0; p < fractured.pieces; ++p)
         files.push_back(folder.file(fmt::format("piece_{:04}{}", p, extension)));
@@ -100,7 +100,8 @@ void write_folder(const FracturedMesh& fractured, const Mesh& input, const Fract
     for (Index p = 0; p < fractured.pieces; ++p) {
         Mesh piece = piece_mesh(fractured, p);
         fit_to_format(format, input, piece);
-        session.warn(require(write_mesh(piece, files[p], {.materials_beside = options.input}, quiet)));
+        session.warn(
+            require(write_mesh(piece, path_of(files[p]), {.materials_beside = path_of(options.input)}, quiet)));
         session.context().report("writing pieces", double(p + 1) / fractured.pieces);
     }
     folder.keep();
@@ -130,7 +131,7 @@ void run(FractureArguments options, Session& session) {
     if (is_folder(options.output)) {
         write_folder(fractured, mesh, options, session, report);
     } else {
-        fit_to_format(require(mesh_format(options.output)), mesh, fractured.mesh);
+        fit_to_format(require(mesh_format(path_of(options.output))), mesh, fractured.mesh);
         session.write_mesh(fractured.mesh, options.output, options.input);
         report_mesh_written(fractured.mesh, options.output, report);
     }

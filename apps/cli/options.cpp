@@ -29,7 +29,7 @@ void refuse_to_overwrite_inputs(const OptionList& options) {
         for (const Option& input : options)
             for (const std::string& read : paths_of(input))
                 for (const std::string& written : paths_of(output))
-                    if (input.file == Option::File::read && is_one_regular_file(read, written))
+                    if (input.file == Option::File::read && is_one_regular_file(path_of(read), path_of(written)))
                         refuse(written +
                                ": is the input and would be overwritten; choose "
                                "another place with " +

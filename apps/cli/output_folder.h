@@ -39,7 +39,7 @@ public:
     }
     /// Where to write; to be asked for all files before the work, for it refuses the places of inputs.
     std::string file(const std::string& name) {
-        const std::filesystem::path file = path_ / name;
+        const std::filesystem::path file = path_ / path_of(name);
         std::error_code failed;
         const auto is_one = [&](const std::filesystem::path& input) {
             return !input.empty() && std::filesystem::equivalent(file, input, failed) && !failed;

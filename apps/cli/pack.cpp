@@ -23,7 +23,8 @@ struct PackArguments {
 };
 
 std::uint64_t size_of(const std::string& path) {
-    return std::filesystem::is_regular_file(path) ? std::uint64_t(std::filesystem::file_size(path)) : 0;
+    return std::filesystem::is_regular_file(path_of(path)) ? std::uint64_t(std::filesystem::file_size(path_of(path)))
+                                                           : 0;
 }
 
 void report_coding(const Model& model, const PackReport& coding, const PackArguments& options, double seconds,
@@ -47,7 +48,7 @@ void report_surface(const Model& model, const PackArguments& options, Session& s
     if (model.mesh.face_count() == 0) return;
     const RunContext context = session.silent_context();
     const double start = now_seconds();
-    const FileReader file = require(FileReader::open(options.output));
+    const FileReader file = require(FileReader::open(path_of(options.output)));
     const Mesh read = require(read_model(file, options.output, context)).mesh;
     const double seconds = now_seconds() - start;
     add_stream_marks(require(read_model_outline(file, options.output, context)), report);
@@ -76,7 +77,8 @@ Model model_of(const PackArguments& options, Session& session, PoseSequence& pos
 /// Codes the model bit for bit, reads it back, and says how much smaller it became.
 void pack_lossless(const Model& model, const PoseSequence& poses, const PackArguments& options, Session& session) {
     const double start = now_seconds();
-    const LosslessPackReport coding = require(pack_model_lossless(model, poses, options.output, session.context()));
+    const LosslessPackReport coding =
+        require(pack_model_lossless(model, poses, path_of(options.output), session.context()));
     const double seconds = now_seconds() - start;
     const std::uint64_t bytes = size_of(options.output);
     Report report;
@@ -89,7 +91,7 @@ void pack_lossless(const Model& model, const PoseSequence& poses, const PackArgu
     if (options.output == "-") return session.print(report);
     const RunContext context = session.silent_context();
     const double read_start = now_seconds();
-    const FileReader file = require(FileReader::open(options.output));
+    const FileReader file = require(FileReader::open(path_of(options.output)));
     require(read_model(file, options.output, context)); // held against the plain sections' checksums
     require(read_poses(file, options.output, context));
     const double read_seconds = now_seconds() - read_start;
@@ -102,7 +104,7 @@ void pack_lossless(const Model& model, const PoseSequence& poses, const PackArgu
 }
 
 void run(PackArguments options, Session& session) {
-    if (mesh_format(options.output).ok())
+    if (mesh_format(path_of(options.output)).ok())
         refuse(options.output + ": is the name of a mesh; give the model another, such as NAME.fil.");
     options.code.levels = options.profile == Profile::stream;
     if (options.profile == Profile::lossless && options.code != PackOptions())
@@ -113,7 +115,8 @@ void run(PackArguments options, Session& session) {
     session.begin_writing(options.output);
     if (options.profile == Profile::lossless) return pack_lossless(model, poses, options, session);
     const double start = now_seconds();
-    const PackReport coding = require(pack_model(model, poses, options.code, options.output, session.context()));
+    const PackReport coding =
+        require(pack_model(model, poses, options.code, path_of(options.output), session.context()));
     Report report;
     report_coding(model, coding, options, now_seconds() - start, report);
     if (coding.lacks_level_attributes) session.warn(kLevelsLackAttributes);
@@ -165,7 +168,7 @@ void run_unpack(const UnpackArguments& options, Session& session) {
     PoseSequence poses;
     const Model model = session.read_model(session.open_model(options.input), options.input, &poses);
     session.begin_writing(options.output);
-    const Status written = write_model(model, poses, options.output, session.context());
+    const Status written = write_model(model, poses, path_of(options.output), session.context());
     if (!written) throw Failure{written.error()};
     Report report;
     report.say(fmt::format("{}: {} vertices, a driver of {}\n", options.output, with_commas(model.vertex_count()),

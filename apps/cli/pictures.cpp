@@ -1,6 +1,7 @@
 #include "pictures.h"
 
 #include "filigree/core/color.h"
+#include "filigree/file.h"
 #include "filigree/mesh/up_axis.h"
 
 #include <filesystem>
@@ -40,7 +41,7 @@ void report_picture(const std::string& path, UpAxis up, Report& report) {
 }
 
 std::string file_name(const std::string& path) {
-    return path == "-" ? "standard input" : std::filesystem::path(path).filename().string();
+    return path == "-" ? "standard input" : path_of(path).filename().string();
 }
 
 } // namespace filigree::cli

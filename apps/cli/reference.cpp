@@ -41,7 +41,7 @@ void strip_with_reference_code(const std::string& input, const std::string& outp
     const ReferenceModel model = require(strip_to_reference(std::move(mesh), options, session.context()));
     const double done = now_seconds();
     session.begin_writing(output);
-    require(write_reference_model(model, output, session.context()));
+    require(write_reference_model(model, path_of(output), session.context()));
     const double written = now_seconds();
 
     Report report;

@@ -159,7 +159,7 @@ void report_remesh(const QuadRemeshed& result, const RunSeconds& run, Report& re
 
 /// Before any work: what cannot be written.
 void check_outputs(const RemeshArguments& options) {
-    if (options.output != "-") require(mesh_format(options.output));
+    if (options.output != "-") require(mesh_format(path_of(options.output)));
     check_second_output("--base", options.base, options.output);
     if (!options.picture.empty()) check_png_path(options.picture);
 }

@@ -61,14 +61,14 @@ void check(const RenderOptions& options, bool is_film) {
         refuse("A film reads its files twice, and standard input can be read once; give file names.");
     const bool has_page = is_film ? !options.scalar.empty()
                                   : !options.scalar.empty() || !options.captions.empty() || options.files.size() > 1 ||
-                                        lower_extension(options.output) != ".png";
+                                        lower_extension(path_of(options.output)) != ".png";
     if (options.as == DrawnAs::surfels &&
         (options.points || options.edges || options.wireframe || options.restore.level))
         refuse("--as surfels draws neither points nor edges nor levels; leave --points, --edges, --wireframe and "
                "--level out.");
     if (options.background == "transparent" && has_page)
         refuse("--background transparent is for one picture in a .png without captions and legend; a page is white.");
-    if (!options.chunk.empty() && !printf_numbered_name(options.output))
+    if (!options.chunk.empty() && !printf_numbered_name(path_of(options.output)))
         refuse("--chunk is of numbered pictures; let -o be a name such as frame_%04d.png.");
     if (!options.chunk.empty()) (void)chunk_of(options.chunk);
     if (options.turntable && !is_film)
@@ -166,7 +166,7 @@ OptionList film_options(RenderOptions& options) {
 }
 
 void run(const RenderOptions& options, Session& session) {
-    const bool is_film = is_film_path(options.output);
+    const bool is_film = is_film_path(path_of(options.output));
     check(options, is_film);
     is_film ? render_film(options, session) : render_still(options, session);
 }

@@ -44,7 +44,7 @@ public:
         const double start = now_seconds();
         const double rate = options_.frames_per_second.value_or(
             is_own_ && options_.frame == 0 && !options_.turntable ? subject_->poses.frames_per_second : 30);
-        FilmWriter writer = require(FilmWriter::create(options_.output, size_.width, size_.height, rate));
+        FilmWriter writer = require(FilmWriter::create(path_of(options_.output), size_.width, size_.height, rate));
         prepare();
         require(film_frames(
             frames_, [&](std::size_t frame, const RunContext& quiet) { return draw(frame, quiet); },
@@ -66,8 +66,8 @@ private:
         const double start = now_seconds();
         WorkChunk chunk = chunk_of(options_.chunk);
         chunk.job = job();
-        const NumberedName name = *printf_numbered_name(options_.output);
-        SharedItems pictures{.path = options_.output, .what = "pictures", .names = {}, .phase = "filming"};
+        const NumberedName name = *printf_numbered_name(path_of(options_.output));
+        SharedItems pictures{.path = path_of(options_.output), .what = "pictures", .names = {}, .phase = "filming"};
         for (std::size_t frame = 0; frame < frames_; ++frame)
             pictures.names.push_back(name.file(frame + 1).filename().string());
         session_.begin_writing(options_.output);
@@ -81,7 +81,7 @@ private:
         const auto are_there = [&] {
             std::error_code failed;
             return std::ranges::all_of(pictures.names, [&](const std::string& name_of_one) {
-                return std::filesystem::exists(name.folder / name_of_one, failed);
+                return std::filesystem::exists(name.folder / path_of(name_of_one), failed);
             });
         };
         const SharedItemsReport written = require(make_shared_items(
@@ -94,9 +94,10 @@ private:
 
     /// What the pictures are made of, as a line of text.
     std::string job() const {
-        std::vector<std::filesystem::path> inputs(options_.files.begin(), options_.files.end());
-        inputs.insert(inputs.end(), options_.poses.begin(), options_.poses.end());
-        if (!options_.against.empty()) inputs.emplace_back(options_.against);
+        std::vector<std::filesystem::path> inputs;
+        for (const std::string& file : options_.files) inputs.push_back(path_of(file));
+        for (const std::string& poses : options_.poses) inputs.push_back(path_of(poses));
+        if (!options_.against.empty()) inputs.push_back(path_of(options_.against));
         const std::string settings = session_.settings_but(
             {"files", "--poses", "--against", "--output", "--chunk", "--threads", "--quiet", "--json"});
         return require(hash_of_files(inputs)) + " " + hash_of_bytes(settings);
@@ -110,7 +111,7 @@ private:
         for (std::size_t k = 0; k < pictures.size(); ++k) {
             if (Status free = batch->check_place(pictures[k]); !free) return free;
             if (const int failed = platform::link(file(k), batch->path(pictures[k])))
-                return cannot_write(folder / pictures[k], failed);
+                return cannot_write(folder / path_of(pictures[k]), failed);
         }
         return batch->finish();
     }

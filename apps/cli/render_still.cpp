@@ -57,7 +57,7 @@ public:
         if (alone_.width)
             write_picture(alone_, options_.output, session_);
         else
-            require(page_.write(options_.output, 1));
+            require(page_.write(path_of(options_.output), 1));
         report("", layout_.page, 1, now_seconds() - start);
     }
 
@@ -94,7 +94,7 @@ private:
             renderer_.picture(scene_of(subject), camera, picture_options(layout_.width, layout_.height), context()));
         title_ = subject.scalar_title;
         subjects_[i].reset();
-        if (count_ == 1 && !has_captions_ && !has_scalars() && lower_extension(options_.output) == ".png") {
+        if (count_ == 1 && !has_captions_ && !has_scalars() && lower_extension(path_of(options_.output)) == ".png") {
             alone_ = std::move(picture);
             return;
         }

@@ -63,11 +63,11 @@ bool Rendering::is_level_at_rest(const FileReader& file, const std::string& path
 }
 
 void Rendering::finish(Subject& subject, const std::string& path) {
-    subject.materials = load_surface_materials(subject.mesh, path);
+    subject.materials = load_surface_materials(subject.mesh, path_of(path));
     session_.warn(subject.materials.warnings);
     if (subject.mesh.vertex_count() == 0)
         refuse(ErrorCode::unsuitable, path + ": has no vertices, so there is nothing to draw.");
-    if (!std::exchange(up_known_, true)) up_ = up_of(options_.up, subject.mesh, path);
+    if (!std::exchange(up_known_, true)) up_ = up_of(options_.up, subject.mesh, path_of(path));
     choose_scalars(subject, path);
     if (options_.as == DrawnAs::surfels) choose_surfels(subject, path);
 }

@@ -74,7 +74,7 @@ struct RestoreArguments {
 
 /// A name without an ending is a folder to come.
 std::string animation_place(const std::string& output) {
-    const bool is_plain = !std::filesystem::path(output).has_extension() && !is_animation_path(output) && output != "-";
+    const bool is_plain = !path_of(output).has_extension() && !is_animation_path(output) && output != "-";
     return is_plain ? output + "/" : output;
 }
 
@@ -97,13 +97,13 @@ void check(const RestoreArguments& options, const Session& session) {
         refuse("--input-order writes one mesh, the finest: give --pose or --frame, and neither --level nor --surfels.");
     if (!options.chunk.empty() && !options.is_animation()) refuse("--chunk belongs to --poses or --frames.");
     if (!options.chunk.empty()) (void)chunk_of(options.chunk);
-    if (!options.chunk.empty() && animation_format(options.output).value() != AnimationFormat::pc2)
+    if (!options.chunk.empty() && animation_format(path_of(options.output)).value() != AnimationFormat::pc2)
         refuse(options.output + ": chunks are written of .pc2 alone, whose frames all have one size.");
     const std::string given = given_animation_option(session);
     if (!options.is_animation() && !given.empty()) refuse(given + " belongs to --poses or --frames.");
     if (!options.is_animation()) return;
     const std::string place = animation_place(options.output);
-    if (!is_animation_path(place) && mesh_format(place))
+    if (!is_animation_path(place) && mesh_format(path_of(place)))
         refuse(place + ": is the name of one mesh, and there are many; put #### where their numbers go, or give -o a "
                        "folder (NAME/), .pc2, .mdd, .usda or .glb.");
     check_animation_path(place);
@@ -142,7 +142,7 @@ Pose moved_pose(const Model& model, const std::string& path, const RestoreArgume
     if (moved.vertex_count() > driver.vertex_count())
         if (const std::optional<VertexMatch> match = match_by_faces(driver, moved)) {
             std::vector<Vec3f> positions(driver.vertex_count());
-            require(match->apply(pose.positions, positions, path));
+            require(match->apply(pose.positions, positions, path_of(path)));
             pose = {std::move(positions), {}};
             session.warn(fmt::format("{}: its {} vertices were split for their normals or UVs; those at one place are "
                                      "one again, which makes the driver's {}.",
@@ -219,9 +219,9 @@ void restore_reference_code(const FileReader& file, const RestoreArguments& opti
 
 /// What the frames are made of: the bytes of the inputs, and the settings.
 std::string job_of(const RestoreArguments& options) {
-    std::vector<std::filesystem::path> inputs{options.model};
+    std::vector<std::filesystem::path> inputs{path_of(options.model)};
     if (!options.poses.empty())
-        for (const std::filesystem::path& path : animation_files(options.poses)) inputs.push_back(path);
+        for (const std::filesystem::path& path : animation_files(path_of(options.poses))) inputs.push_back(path);
     const RestoreOptions& restore = options.restore;
     const PoseFileOptions& file = options.poses_file;
     return fmt::format("{} level {} rate {} animation {} up {}", require(hash_of_files(inputs)),
@@ -269,8 +269,8 @@ void restore_chunk(const FileReader& file, const RestoreArguments& options, Sess
     session.begin_writing(options.output);
     const ChunkReport written =
         model.in_file
-            ? require(write_restored_chunks(*model.in_file, model.poses, options.restore, options.output, chunk,
-                                            session.context()))
+            ? require(write_restored_chunks(*model.in_file, model.poses, options.restore, path_of(options.output),
+                                            chunk, session.context()))
             : write_chunk_output(*model.in_memory, model.poses, options.restore, chunk, options.output, session);
     const double seconds = now_seconds() - start;
     Report report;

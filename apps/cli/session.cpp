@@ -148,8 +148,9 @@ void Session::warn(const std::vector<std::string>& sentences) {
 
 FileReader Session::open(const std::string& path) const {
     std::error_code ignored;
-    is_waiting_for_input = path == "-" || !std::filesystem::is_regular_file(path, ignored); // a pipe, a terminal
-    Result<FileReader> file = FileReader::open(path);
+    is_waiting_for_input =
+        path == "-" || !std::filesystem::is_regular_file(path_of(path), ignored); // a pipe, a terminal
+    Result<FileReader> file = FileReader::open(path_of(path));
     is_waiting_for_input = 0;
     return require(std::move(file));
 }
@@ -212,14 +213,14 @@ void Session::begin_writing(const std::string& path) {
 void Session::write_mesh(const Mesh& mesh, const std::string& path, const std::string& source) {
     begin_writing(path);
     WriteMeshOptions options;
-    if (source != "-") options.materials_beside = source;
+    if (source != "-") options.materials_beside = path_of(source);
     if (path == "-") options.format = MeshFormat::ply; // no name to tell the format by: PLY holds the most
-    warn(require(filigree::write_mesh(mesh, path, options, context())));
+    warn(require(filigree::write_mesh(mesh, path_of(path), options, context())));
 }
 
 void Session::write_model(const Model& model, const std::string& path, const PoseSequence& poses) {
     begin_writing(path);
-    require(filigree::write_model(model, poses, path, context()));
+    require(filigree::write_model(model, poses, path_of(path), context()));
 }
 
 void Session::print(const std::string& text, Json object) {
@@ -235,7 +236,7 @@ void Session::print(const std::string& text, Json object) {
 
 void check_folder_of(const std::string& path) {
     std::error_code ignored;
-    const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+    const std::filesystem::path folder = path_of(path).parent_path();
     if (!folder.empty() && !std::filesystem::is_directory(folder, ignored))
         refuse(ErrorCode::unwritable, path + ": cannot be written: there is no such folder.");
 }
@@ -245,7 +246,7 @@ void check_second_output(const std::string& option, const std::string& path, con
     if (path == first)
         refuse(option + " and -o both write to " + (path == "-" ? "standard output" : path) +
                "; give each a place of its own.");
-    if (path != "-") require(mesh_format(path));
+    if (path != "-") require(mesh_format(path_of(path)));
 }
 
 void report_mesh_written(const Mesh& mesh, const std::string& path, Report& report) {

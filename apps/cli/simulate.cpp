@@ -1,3 +1,4 @@
+#include "simulate.h"
 #include "animation_output.h"
 #include "commands.h"
 #include "drawing.h"
@@ -25,14 +26,6 @@ namespace fs = std::filesystem;
 
 constexpr double kMoltenKeys = 10; // a second of a GLB whose faces change in time
 
-struct SimulateArguments {
-    std::string scene, save, resume;
-    std::vector<std::string> outputs;
-    std::size_t frames = 0, stop_at = 0; ///< 0: as the scene says; not before the end
-    bool check = false, finer = false, keys = false, as_surfels = false;
-    AnimationOutput animation;
-};
-
 /// Where a run's results go, sorted by kind, and everything that can be refused before the work.
 struct Outputs {
     std::vector<std::string> models, films, folders, animations;
@@ -43,11 +36,11 @@ struct Outputs {
             if (std::find(paths.begin(), paths.begin() + std::ptrdiff_t(i), path) != paths.begin() + std::ptrdiff_t(i))
                 refuse(path + ": two outputs cannot go to one place.");
             std::error_code ignored;
-            const bool is_folder = path.ends_with('/') || fs::is_directory(path, ignored);
+            const bool is_folder = path.ends_with('/') || fs::is_directory(path_of(path), ignored);
             if (!is_folder) check_folder_of(path);
             if (is_folder)
                 folders.push_back(path);
-            else if (lower_extension(path) == ".fil")
+            else if (lower_extension(path_of(path)) == ".fil")
                 models.push_back(path);
             else if (is_film(path))
                 films.push_back(path);
@@ -65,7 +58,7 @@ struct Outputs {
 /// "out.fil", or "out_NAME.fil" where there are several bodies.
 std::string model_path(const std::string& path, std::size_t bodies, const std::string& body) {
     if (bodies == 1) return path;
-    const fs::path whole(path);
+    const fs::path whole = path_of(path);
     return (whole.parent_path() / fmt::format("{}_{}{}", whole.stem().string(), body, whole.extension().string()))
         .string();
 }
@@ -84,21 +77,23 @@ NumberedName mesh_names(const fs::path& folder, const std::string& body) {
 
 /// Refuses outputs that would go over what the run reads, or over each other.
 void check_places(const SimulateArguments& options, const SceneFile& scene, const Outputs& outputs) {
-    std::vector<std::pair<fs::path, std::string>> taken = {{options.scene, "the scene"}};
+    std::vector<std::pair<fs::path, std::string>> taken;
+    if (!options.scene.empty()) taken.emplace_back(path_of(options.scene), "the scene");
     const auto add_mesh = [&](const std::string& mesh) {
-        if (!mesh.empty()) taken.emplace_back(mesh, "a mesh of the scene");
+        if (!mesh.empty()) taken.emplace_back(path_of(mesh), "a mesh of the scene");
     };
     for (const SceneBody& body : scene.bodies) add_mesh(body.mesh);
     for (const SceneObstacle& obstacle : scene.obstacles) add_mesh(obstacle.mesh);
     const auto take = [&](const std::string& path, const std::string& what) {
         for (const auto& [file, is] : taken)
-            if (is_one_file(path, file)) refuse(fmt::format("{}: is {} and would be overwritten.", path, is));
-        taken.emplace_back(path, what);
+            if (is_one_file(path_of(path), file)) refuse(fmt::format("{}: is {} and would be overwritten.", path, is));
+        taken.emplace_back(path_of(path), what);
     };
     std::vector<std::string> files_read;
     for (const auto& [file, is] : taken) files_read.push_back(file.string());
     if (!options.save.empty()) take(options.save, "where the state goes");
-    if (!options.resume.empty()) taken.emplace_back(options.resume, "the state to go on from"); // may be saved over
+    if (!options.resume.empty())
+        taken.emplace_back(path_of(options.resume), "the state to go on from"); // may be saved over
     for (const std::string& path : outputs.models)
         for (const SceneBody& body : scene.bodies) take(model_path(path, scene.bodies.size(), body.name), "an output");
     const auto take_numbered = [&](const std::string& path, const NumberedName& name) {
@@ -107,7 +102,7 @@ void check_places(const SimulateArguments& options, const SceneFile& scene, cons
                 refuse(fmt::format("{}: {} is {} and would be overwritten.", path, file.string(), is));
     };
     for (const std::string& path : outputs.films) {
-        if (const auto name = printf_numbered_name(path); name && lower_extension(path) == ".png")
+        if (const auto name = printf_numbered_name(path_of(path)); name && lower_extension(path_of(path)) == ".png")
             take_numbered(path, *name);
         take(path, "an output");
     }
@@ -118,7 +113,7 @@ void check_places(const SimulateArguments& options, const SceneFile& scene, cons
             take(place, "an output");
         }
     for (const std::string& path : outputs.folders) {
-        for (const SceneBody& body : scene.bodies) take_numbered(path, mesh_names(path, body.name));
+        for (const SceneBody& body : scene.bodies) take_numbered(path, mesh_names(path_of(path), body.name));
         take(path, "an output");
     }
 }
@@ -147,8 +142,8 @@ Result<Mesh> melting_mesh(MeltingSurface& melting, const Recording& recording, s
 
 class Run {
 public:
-    Run(const SimulateArguments& options, Session& session)
-        : options_(options), session_(session), scene_(require(read_scene(options.scene))), outputs_(options.outputs) {
+    Run(const SimulateArguments& options, SceneFile scene, Session& session)
+        : options_(options), session_(session), scene_(std::move(scene)), outputs_(options.outputs) {
         check_places(options, scene_, outputs_);
         if (options.finer && !scene_.fractures.empty())
             refuse(ErrorCode::unsuitable, options.scene +
@@ -159,7 +154,7 @@ public:
         ready_ = require(set_up(scene_, session.context()));
         session.warn(ready_.warnings);
         run_.emplace(require(SceneRun::create(scene_, ready_, options.check, session.context())));
-        if (!options.resume.empty()) require(run_->resume(require(read_file(options.resume)), options.resume));
+        if (!options.resume.empty()) require(run_->resume(require(read_file(path_of(options.resume))), options.resume));
         session.warn(run_->warnings()); // what is known before the work, such as a body that starts inside an obstacle
     }
 
@@ -230,7 +225,7 @@ private:
     }
     /// Formats that hold a mesh whose faces change in time.
     static bool holds_moments(const std::string& path) {
-        const std::string ending = lower_extension(path);
+        const std::string ending = lower_extension(path_of(path));
         return ending == ".usda" || ending == ".glb";
     }
 
@@ -245,7 +240,7 @@ private:
         const RunContext silent = session_.silent_context();
         const Recording& recording = run_->recording();
         const double rate = scene_.step.frames_per_second;
-        const bool is_glb = lower_extension(path) == ".glb";
+        const bool is_glb = lower_extension(path_of(path)) == ".glb";
         session_.warn(melting.warnings);
         const auto moment = [&](std::size_t frame) -> Result<MeshMoment> {
             Result<CompositeSurface> surface = melting.frame(recording, frame, silent);
@@ -263,10 +258,10 @@ private:
         session_.begin_writing(path);
         const FrameSource<MeshMoment> moments{recording.poses[0].frames.size(), rate, moment};
         if (is_glb)
-            require(write_glb_moments(moments, options_.animation.skin.key_rate.value_or(kMoltenKeys), path,
+            require(write_glb_moments(moments, options_.animation.skin.key_rate.value_or(kMoltenKeys), path_of(path),
                                       session_.context()));
         else
-            require(write_usda_moments(moments, path, warnings, session_.context()));
+            require(write_usda_moments(moments, path_of(path), warnings, session_.context()));
         session_.warn(warnings);
         Report report;
         report.set("output", path);
@@ -291,7 +286,7 @@ private:
             }
         }
     }
-    void save() { require(write_file(options_.save, run_->save())); }
+    void save() { require(write_file(path_of(options_.save), run_->save())); }
 
     [[noreturn]] void cancelled() {
         if (options_.save.empty()) throw Failure{cancelled_error()};
@@ -310,16 +305,16 @@ private:
             MeltingSurface melting = melting_surface();
             session_.warn(melting.warnings);
             if (!melting.is_empty())
-                parts.push_back({mesh_names(path, melting.name()), {frames, rate, [&](std::size_t frame) {
-                                                                        return melting_mesh(
-                                                                            melting, run_->recording(), frame,
-                                                                            ready_.origin, options_.as_surfels, silent);
-                                                                    }}});
+                parts.push_back({mesh_names(path_of(path), melting.name()),
+                                 {frames, rate, [&](std::size_t frame) {
+                                      return melting_mesh(melting, run_->recording(), frame, ready_.origin,
+                                                          options_.as_surfels, silent);
+                                  }}});
             for (std::size_t b = 0; b < ready_.bodies.size(); ++b)
                 if (!melting.has_body(b))
-                    parts.push_back({mesh_names(path, ready_.bodies[b].name), {frames, rate, [&, b](std::size_t frame) {
-                                                                                   return run_->mesh(b, frame, silent);
-                                                                               }}});
+                    parts.push_back(
+                        {mesh_names(path_of(path), ready_.bodies[b].name),
+                         {frames, rate, [&, b](std::size_t frame) { return run_->mesh(b, frame, silent); }}});
             session_.begin_writing(path);
             session_.warn(require(write_numbered_meshes(parts, session_.context())));
         }
@@ -341,7 +336,7 @@ private:
 
 void Run::report() const {
     Report report;
-    report.add("scene", options_.scene, "scene", options_.scene);
+    report.add("scene", scene_.path, "scene", scene_.path);
     report.set("outputs", options_.outputs);
     report_run(scene_, ready_, *run_, report);
     report_finer(ready_, finer_, report);
@@ -357,31 +352,35 @@ void Run::report() const {
     session_.print(report);
 }
 
-void check(const SimulateArguments& options, const Session& session) {
+void check(const SimulateArguments& options) {
     std::error_code ignored;
-    if (fs::is_directory(options.save, ignored))
+    if (fs::is_directory(path_of(options.save), ignored))
         refuse(ErrorCode::unwritable, options.save + ": cannot be written: it is a folder.");
     check_folder_of(options.save);
     if (options.scene.empty()) refuse("Give a scene: filigree simulate SCENE.toml -o OUT.");
     if (options.outputs.empty() && options.save.empty() && !options.check && !options.finer)
         refuse("Say where the motion goes: -o OUT.fil, -o OUT.glb, -o OUT.pc2, -o FILM.mp4 or -o FOLDER/; or give "
                "--save, --check or --finer.");
-    check_animation_options(options.outputs, session);
     if (options.stop_at && options.save.empty())
         refuse("--stop-at stops a run that goes on later; say where with --save.");
 }
 
 void run(const SimulateArguments& options, Session& session) {
     if (options.keys) return session.print(scene_manual(), {{"manual", scene_manual()}});
-    check(options, session);
-    Run run(options, session);
+    check(options);
+    run_scene(require(read_scene(options.scene)), options, session);
+}
+
+} // namespace
+
+void run_scene(SceneFile scene, const SimulateArguments& options, Session& session) {
+    check_animation_options(options.outputs, session);
+    Run run(options, std::move(scene), session);
     run.simulate();
     run.write();
     run.report();
     run.doubt();
 }
-
-} // namespace
 
 Command simulate_command() {
     const auto options = std::make_shared<SimulateArguments>();

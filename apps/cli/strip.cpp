@@ -29,9 +29,9 @@ struct StripSeconds {
 
 /// A model under a mesh's name is a slip, and could be the end of the mesh.
 void refuse_mesh_name(const std::string& path) {
-    if (path != "-" && mesh_format(path).ok())
-        refuse(path + ": is the name of a mesh; give the model another, such as " +
-               std::filesystem::path(path).stem().string() + ".fil.");
+    if (path != "-" && mesh_format(path_of(path)).ok())
+        refuse(path + ": is the name of a mesh; give the model another, such as " + path_of(path).stem().string() +
+               ".fil.");
 }
 
 /// Counts of what did not go as hoped: a row where there is any.
@@ -89,7 +89,7 @@ void bound_memory(const StripCommandOptions& options) {
     const bool is_asked = !options.memory.empty();
     const std::uint64_t limit = is_asked ? parse_memory_size(options.memory) : memory_to_use();
     if (limit == 0) refuse("--memory: '" + options.memory + "' is not a size; give one such as 8G or 500M.");
-    const std::filesystem::path folder = std::filesystem::path(options.output).parent_path();
+    const std::filesystem::path folder = path_of(options.output).parent_path();
     spill_beyond(limit, folder);
     if (is_asked && !can_spill())
         refuse(ErrorCode::unwritable, options.output + ": no file can be made and mapped beside it for what exceeds " +

@@ -117,7 +117,7 @@ public:
         }
         session_.context().report("sweeping", 1);
         session_.begin_writing(options_.output);
-        require(write_file(options_.output, table));
+        require(write_file(path_of(options_.output), table));
         const double seconds = now_seconds() - start;
         Report report;
         report.say(fmt::format("{}: {} in {}\n", options_.output, counted(runs_.size(), "run"), seconds_text(seconds)));
@@ -141,7 +141,8 @@ public:
         WorkChunk chunk = chunk_of(options_.chunk);
         chunk.job = fmt::format("{} {} check {} finer {}", hash_of_bytes(job_), require(hash_of_files(meshes_)),
                                 options_.check, options_.finer);
-        SharedItems items{.path = options_.output, .what = "table of a sweep", .names = {}, .phase = "sweeping"};
+        SharedItems items{
+            .path = path_of(options_.output), .what = "table of a sweep", .names = {}, .phase = "sweeping"};
         for (std::size_t run = 0; run < runs_.size(); ++run) items.names.push_back(fmt::format("run-{}", run + 1));
         session_.begin_writing(options_.output);
         const auto join = [&](const std::function<fs::path(std::size_t)>& file) -> Status {
@@ -155,12 +156,12 @@ public:
             const fs::path whole = temporary_path(file(0).parent_path());
             if (Status written = write_file(whole, table); !written) return written;
             std::error_code failed;
-            fs::rename(whole, options_.output, failed);
-            return failed ? Status(cannot_write(options_.output, failed.value())) : Success{};
+            fs::rename(whole, path_of(options_.output), failed);
+            return failed ? Status(cannot_write(path_of(options_.output), failed.value())) : Success{};
         };
         const auto is_there = [&] {
             std::error_code failed;
-            return fs::exists(options_.output, failed);
+            return fs::exists(path_of(options_.output), failed);
         };
         const SharedItemsReport written = require(make_shared_items(
             items, chunk, [&](std::size_t run) { return rows(run); }, join, is_there, session_.context()));
@@ -183,7 +184,8 @@ private:
     std::size_t frames_of(const SceneFile& scene) const { return options_.frames ? options_.frames : scene.frames; }
     std::string name_of(std::size_t run) const { return fmt::format("run {} of the sweep", run + 1); }
     void add_mesh(const std::string& mesh) {
-        if (!mesh.empty() && std::ranges::find(meshes_, fs::path(mesh)) == meshes_.end()) meshes_.emplace_back(mesh);
+        if (!mesh.empty() && std::ranges::find(meshes_, path_of(mesh)) == meshes_.end())
+            meshes_.push_back(path_of(mesh));
     }
 
     /// Scenes outside, the last key's values innermost.
@@ -282,7 +284,7 @@ private:
 };
 
 void run(const SweepArguments& options, Session& session) {
-    if (lower_extension(options.output) != ".csv")
+    if (lower_extension(path_of(options.output)) != ".csv")
         refuse(ErrorCode::unsupported, options.output + ": a sweep's table is CSV; end its name in .csv.");
     check_folder_of(options.output);
     if (!options.chunk.empty()) (void)chunk_of(options.chunk);

@@ -19,7 +19,7 @@ fs::path find_parts() {
     std::error_code failed;
     fs::path folder;
     if (const char* named = std::getenv("FILIGREE_WEB"); named && *named)
-        folder = named;
+        folder = path_of(named);
     else
         folder = platform::own_program().parent_path() / FILIGREE_WEB_FROM_PROGRAM;
     if (fs::exists(folder / "filigree.js", failed)) return folder;
@@ -73,15 +73,15 @@ WebPage::WebPage(OutputFolder& folder, std::string title, WebModel model)
 void WebPage::write(Session& session) {
     const std::string index = require(read_file(parts_ / "index.html"));
     const std::string titled = replaced(index, "{{title}}", html_text(title_));
-    require(write_file(index_, replaced(titled, "{{model}}", kind_ == WebModel::glb ? "glb" : "stream")));
+    require(write_file(path_of(index_), replaced(titled, "{{model}}", kind_ == WebModel::glb ? "glb" : "stream")));
     for (const std::string& file : {script_, style_, license_})
-        require(write_file(file, require(read_file(parts_ / fs::path(file).filename()))));
+        require(write_file(path_of(file), require(read_file(parts_ / path_of(file).filename()))));
     write_model_script(session);
 }
 
 void WebPage::write_model_script(Session& session) const {
     std::ifstream model(model_, std::ios::binary);
-    FileWriter script = require(FileWriter::create(model_script_));
+    FileWriter script = require(FileWriter::create(path_of(model_script_)));
     std::string piece(kPieceBytes, '\0');
     while (model.read(piece.data(), std::streamsize(piece.size())), model.gcount() > 0) {
         if (session.context().is_cancelled()) throw Failure{cancelled_error()};

@@ -1,5 +1,7 @@
 #include "document.h"
 
+#include "filigree/file.h"
+
 #include <QUndoCommand>
 
 namespace filigree::studio {
@@ -12,7 +14,7 @@ std::shared_ptr<Source> source_of(Mesh mesh, const std::string& path, const std:
     source->name = name;
     source->box = world_bounds(source->mesh);
     source->topology = analyse_topology(source->mesh, context);
-    source->materials = load_surface_materials(source->mesh, path);
+    source->materials = load_surface_materials(source->mesh, path_of(path));
     return source;
 }
 

@@ -1,5 +1,7 @@
 #include "words.h"
 
+#include "filigree/file.h"
+
 #include <QLocale>
 
 #include <filesystem>
@@ -32,12 +34,10 @@ QString rich_table(const std::vector<std::vector<QString>>& rows) {
     return text + "</table>";
 }
 
-QString file_name(const std::string& path) {
-    return QString::fromStdString(std::filesystem::path(path).filename().string());
-}
+QString file_name(const std::string& path) { return QString::fromStdString(path_of(path).filename().string()); }
 
 std::string about_file(const std::string& path, const std::string& sentence) {
-    const std::string name = std::filesystem::path(path).filename().string();
+    const std::string name = path_of(path).filename().string();
     return name.empty() || sentence.find(name) != std::string::npos ? sentence : name + ": " + sentence;
 }
 

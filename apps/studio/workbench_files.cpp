@@ -31,7 +31,7 @@ Error about(const std::string& path, const Error& error) {
 /// A whole new state from a file, with settings as at the start.
 Result<State> read_state(const std::string& path, const RunContext& context) {
     context.report("reading", 0);
-    const Result<std::string> bytes = read_file(path);
+    const Result<std::string> bytes = read_file(path_of(path));
     if (!bytes) return bytes.error();
     State state;
     MeshFile file; // of a model: its mesh alone
@@ -81,7 +81,7 @@ bool feed(ModelStream& stream, const FileReader& file, std::uint64_t& offset) {
 
 /// Whether a file is a stream that is better looked at before all of it is read.
 bool is_large_stream(const std::string& path) {
-    const Result<FileReader> file = FileReader::open(path);
+    const Result<FileReader> file = FileReader::open(path_of(path));
     ModelStream stream(path);
     std::uint64_t offset = 0;
     return file && file->size() > kSmallStream && feed(stream, *file, offset);
@@ -90,7 +90,7 @@ bool is_large_stream(const std::string& path) {
 /// The first levels of a stream, stripped. None: they are damaged, which reading all of it will tell.
 Result<std::optional<State>> first_look(const std::string& path, const BodySettings& body, const RunContext& context) {
     context.report("reading", 0);
-    const Result<FileReader> file = FileReader::open(path);
+    const Result<FileReader> file = FileReader::open(path_of(path));
     ModelStream stream(path);
     Mesh mesh;
     std::size_t levels = 0;
@@ -146,7 +146,8 @@ std::vector<QString> lost_with_model(const State& state) {
 /// Returns what to tell. source: the file that the mesh came from; "" for none.
 Result<QString> write_told(const Mesh& mesh, const std::string& path, const RunContext& context,
                            const std::string& source = {}) {
-    const Result<std::vector<std::string>> warnings = write_mesh(mesh, path, {.materials_beside = source}, context);
+    const Result<std::vector<std::string>> warnings =
+        write_mesh(mesh, path_of(path), {.materials_beside = path_of(source)}, context);
     if (!warnings) return warnings.error();
     QString text = QString("Saved %1: %2, %3.")
                        .arg(file_name(path), counted(mesh.vertex_count(), "vertex", "vertices"),
@@ -181,9 +182,9 @@ std::vector<std::string> existing_outputs(const std::string& pattern, std::size_
     std::vector<std::string> result;
     const auto add = [&](const std::string& path) {
         std::error_code ignored;
-        if (fs::exists(path, ignored)) result.push_back(path);
+        if (fs::exists(path_of(path), ignored)) result.push_back(path);
     };
-    const std::optional<NumberedName> numbered = printf_numbered_name(pattern);
+    const std::optional<NumberedName> numbered = printf_numbered_name(path_of(pattern));
     if (!numbered) add(pattern);
     for (std::size_t frame = 1; numbered && frame <= frames; ++frame) add(numbered->file(frame).string());
     return result;
@@ -284,7 +285,7 @@ void Workbench::save_model(const std::string& path) {
                 poses = state.recording->poses();
             else if (!pose.positions.empty())
                 poses.frames.push_back(std::move(pose));
-            const Status status = write_model(*state.model, poses, path, context);
+            const Status status = write_model(*state.model, poses, path_of(path), context);
             if (!status) return status.error();
             return sentence;
         },
@@ -310,7 +311,7 @@ void Workbench::save_driver(const std::string& path) {
 }
 
 void Workbench::export_meshes(const std::string& pattern) {
-    const std::optional<NumberedName> name = printf_numbered_name(pattern);
+    const std::optional<NumberedName> name = printf_numbered_name(path_of(pattern));
     if (!name)
         return Q_EMIT told(QString::fromStdString(pattern) + ": needs one place for the frame's number, such as %04d "
                                                              "in frame_%04d.obj.",

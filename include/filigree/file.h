@@ -25,7 +25,11 @@
 namespace filigree {
 
 // ---------------------------------------------------------------------------------------------------------------------
-// Bytes
+// Names and bytes
+
+/// The path that a text in UTF-8 names. Needed on Windows, where std::filesystem::path takes the bytes of a
+/// std::string for characters of the C locale; elsewhere the bytes are kept as they are.
+std::filesystem::path path_of(std::string_view utf8);
 
 /// The bytes of a file; "-" is standard input. Errors: not_found (missing, a directory, no permission), out_of_memory.
 Result<std::string> read_file(const std::filesystem::path& path);

@@ -146,7 +146,8 @@ struct ScenePicture {
     UpAxis up = UpAxis::y;
     std::optional<Vec3d> eye = {}, target = {}; ///< m, world
     double field_of_view = 30;                  ///< degrees
-    std::array<unsigned, 2> size = {960, 720};  ///< width and height, pixels
+    bool follow = true; ///< without an eye: the camera moves with the bodies where that shows them larger
+    std::array<unsigned, 2> size = {960, 720}; ///< width and height, pixels
     unsigned passes = 8;
     SceneBackground background;
     bool ground = true, obstacles = true, particles = false; ///< what is drawn
@@ -181,6 +182,8 @@ struct SceneValue {
 /// this order. Errors, with file and line (without a line for `values`): bad_file (not TOML; an unknown key, with a
 /// suggestion; a wrong type or range), not_found.
 Result<SceneFile> read_scene(const std::string& path, std::span<const SceneValue> values = {});
+/// The same of a text that has no file yet. path: of the file that it would be, for its folder and for messages.
+Result<SceneFile> parse_scene(std::string_view text, const std::string& path, std::span<const SceneValue> values = {});
 
 // ---------------------------------------------------------------------------------------------------------------------
 // Simulating a scene

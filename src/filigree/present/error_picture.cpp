@@ -1,5 +1,6 @@
 #include "filigree/present/error_picture.h"
 
+#include "filigree/file.h"
 #include "filigree/present/headless_renderer.h"
 #include "filigree/present/page.h"
 
@@ -39,7 +40,7 @@ Status write_error_picture(const Mesh& mesh, const HeatMap& errors, const std::s
     page.legend(ColorMap::sequential, errors.range, legend, {kWidth + 14, 24}, 420);
     page.text(caption, {kWidth / 2.0, kHeight + 26}, {.size = 15, .align = Align::centre});
     if (context.is_cancelled()) return cancelled_error();
-    return page.write(path, 1);
+    return page.write(path_of(path), 1);
 }
 
 } // namespace filigree

@@ -1,5 +1,6 @@
 #include "filigree/present/model_film.h"
 
+#include "filigree/file.h"
 #include "filigree/present/film_frames.h"
 #include "filigree/present/headless_renderer.h"
 #include "filigree/present/textured_look.h"
@@ -65,8 +66,8 @@ Scene scene_of(const ModelFilm& film, const Drawable& model, std::span<const Dra
 Result<std::size_t> film_model(const ModelFilm& film, const std::string& path, const RunContext& context) {
     const bool turns = film.poses.empty();
     const std::size_t frames = turns ? kTurntableFrames : film.poses.frames.size();
-    Result<FilmWriter> writer =
-        FilmWriter::create(path, film.width, film.height, turns ? kTurntableRate : film.poses.frames_per_second);
+    Result<FilmWriter> writer = FilmWriter::create(path_of(path), film.width, film.height,
+                                                   turns ? kTurntableRate : film.poses.frames_per_second);
     if (!writer) return writer.error();
     Result<HeadlessRenderer> renderer = HeadlessRenderer::create();
     if (!renderer) return renderer.error();

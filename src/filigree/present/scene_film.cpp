@@ -1,6 +1,8 @@
 #include "filigree/present/scene_film.h"
 
+#include "filigree/file.h"
 #include "filigree/present/film_frames.h"
+#include "filigree/present/follow_camera.h"
 #include "filigree/present/textured_look.h"
 #include "filigree/render/surface_materials.h"
 #include "filigree/restore.h"
@@ -67,8 +69,9 @@ public:
         shown.ground = picture.ground;
         shown.fixed_ground = true;
         shown.ground_level = ground_level_;
-        return renderer.picture(
-            shown, camera_, {.width = picture.size[0], .height = picture.size[1], .passes = picture.passes}, quiet_);
+        return renderer.picture(shown, cameras_[std::min(number, cameras_.size() - 1)],
+                                {.width = picture.size[0], .height = picture.size[1], .passes = picture.passes},
+                                quiet_);
     }
     std::size_t frames() const { return frames_; }
     std::vector<std::string> warnings;
@@ -92,7 +95,7 @@ private:
             return;
         }
         if (!body.mesh_path.empty()) {
-            shown.materials = load_surface_materials(body.model.mesh, body.mesh_path);
+            shown.materials = load_surface_materials(body.model.mesh, path_of(body.mesh_path));
             warnings.insert(warnings.end(), shown.materials.warnings.begin(), shown.materials.warnings.end());
         }
         SurfaceOptions surface;
@@ -161,9 +164,9 @@ private:
         return mesh;
     }
 
-    /// Where everything goes: one camera for the whole film.
+    /// Where everything goes, and where the camera is.
     void look_ahead() {
-        std::vector<Vec3f> seen;
+        std::vector<std::vector<Vec3f>> seen(frames_);
         for (ShownBody& shown : actors_) {
             const std::size_t b = std::size_t(&shown - actors_.data());
             const Restorer restorer = Restorer::create(shown.body->model, shown.restore, quiet_).value();
@@ -177,36 +180,51 @@ private:
                 else
                     restorer.positions(recording_.poses[b].frames[frame], positions, quiet_).value();
                 extend(box_, positions);
-                for (std::size_t v = frame % stride; v < positions.size(); v += stride) seen.push_back(positions[v]);
+                for (std::size_t v = frame % stride; v < positions.size(); v += stride)
+                    seen[frame].push_back(positions[v]);
             }
         }
         context_.report("looking ahead", 1);
         leave_out_strays(seen);
-        if (scene_.picture.obstacles) see_obstacles(seen);
         const ScenePicture& picture = scene_.picture;
-        const double aspect = double(picture.size[0]) / picture.size[1];
+        if (!picture.follow || picture.eye) { // all at once
+            for (std::size_t frame = 1; frame < frames_; ++frame) {
+                seen[0].insert(seen[0].end(), seen[frame].begin(), seen[frame].end());
+                seen[frame] = {};
+            }
+            seen.resize(1);
+        }
+        if (scene_.picture.obstacles) see_obstacles(seen);
         if (picture.eye) {
-            camera_.eye = *picture.eye - ready_.origin;
-            camera_.target = *picture.target - ready_.origin;
-            camera_.up = up_vector(picture.up);
-            camera_.field_of_view_deg = picture.field_of_view;
-            camera_.height = (camera_.eye - camera_.target).norm();
+            Camera& camera = cameras_.emplace_back();
+            camera.eye = *picture.eye - ready_.origin;
+            camera.target = *picture.target - ready_.origin;
+            camera.up = up_vector(picture.up);
+            camera.field_of_view_deg = picture.field_of_view;
+            camera.height = (camera.eye - camera.target).norm();
             return;
         }
-        const CameraPoints points{seen};
-        camera_ = fit_camera(std::span(&points, 1), view_direction(picture.view, picture.up), up_vector(picture.up),
-                             aspect, picture.field_of_view);
+        cameras_ = follow_cameras(seen, {.direction = view_direction(picture.view, picture.up),
+                                         .up = up_vector(picture.up),
+                                         .aspect = double(picture.size[0]) / picture.size[1],
+                                         .field_of_view_deg = picture.field_of_view,
+                                         .frames_per_second = scene_.step.frames_per_second});
     }
 
     /// A few points that leave the rest far behind (drops of a melt) are not what the picture is made for.
-    void leave_out_strays(std::vector<Vec3f>& seen) {
+    void leave_out_strays(std::vector<std::vector<Vec3f>>& seen) {
         constexpr double kStrays = 0.001, kMargin = 0.25; // a part of all points; in diagonals of the others' box
-        if (seen.size() < 1000) return;
+        std::size_t count = 0;
+        for (const std::vector<Vec3f>& frame : seen) count += frame.size();
+        if (count < 1000) return;
         Box others;
         others.min = others.max = Vec3d::Zero();
-        std::vector<float> values(seen.size());
+        std::vector<float> values;
+        values.reserve(count);
         for (int axis = 0; axis < 3; ++axis) {
-            std::transform(seen.begin(), seen.end(), values.begin(), [&](const Vec3f& p) { return p[axis]; });
+            values.clear();
+            for (const std::vector<Vec3f>& frame : seen)
+                for (const Vec3f& p : frame) values.push_back(p[axis]);
             const auto at = [&](double part) {
                 const auto place = values.begin() + std::ptrdiff_t(part * double(values.size() - 1));
                 std::nth_element(values.begin(), place, values.end());
@@ -218,30 +236,38 @@ private:
         const double margin = kMargin * others.diagonal();
         others.min.array() -= margin;
         others.max.array() += margin;
-        std::erase_if(seen, [&](const Vec3f& p) {
-            return (p.cast<double>().array() < others.min.array()).any() ||
-                   (p.cast<double>().array() > others.max.array()).any();
-        });
+        for (std::vector<Vec3f>& frame : seen)
+            std::erase_if(frame, [&](const Vec3f& p) {
+                return (p.cast<double>().array() < others.min.array()).any() ||
+                       (p.cast<double>().array() > others.max.array()).any();
+            });
         box_.min = box_.min.cwiseMax(others.min);
         box_.max = box_.max.cwiseMin(others.max);
     }
 
-    void see_obstacles(std::vector<Vec3f>& seen) {
-        Box near = box_;
-        near.min.array() -= kRoom * box_.diagonal();
-        near.max.array() += kRoom * box_.diagonal();
-        for (const ShownObstacle& obstacle : ready_.drawn) {
-            const std::size_t moments = obstacle.moves ? frames_ : 1;
-            for (std::size_t frame = 0; frame < moments; frame += 1 + moments / 32) {
-                const std::vector<Vec3f> points = moved(obstacle.mesh.positions, obstacle.motion.at(time_of(frame)));
-                const std::size_t stride = 1 + points.size() / 2000;
-                for (std::size_t v = 0; v < points.size(); v += stride) {
-                    const Vec3d p = points[v].cast<double>();
-                    if ((p.array() < near.min.array()).any() || (p.array() > near.max.array()).any()) continue;
-                    seen.push_back(points[v]);
-                    lowest_obstacle_ = std::min(lowest_obstacle_, p[axis()]);
-                }
+    /// Obstacles near the bodies: of each frame, or in all frames where there is one list for all.
+    void see_obstacles(std::vector<std::vector<Vec3f>>& seen) {
+        for (std::size_t k = 0; k < seen.size(); ++k) {
+            Box near = bounds(seen[k]);
+            const double room = kRoom * near.diagonal();
+            near.min.array() -= room;
+            near.max.array() += room;
+            for (const ShownObstacle& obstacle : ready_.drawn) {
+                const bool is_all = seen.size() == 1 && obstacle.moves;
+                const std::size_t first = is_all ? 0 : k, last = is_all ? frames_ : k + 1;
+                for (std::size_t frame = first; frame < last; frame += 1 + (last - first) / 32)
+                    see_obstacle(obstacle, frame, near, seen[k]);
             }
+        }
+    }
+    void see_obstacle(const ShownObstacle& obstacle, std::size_t frame, const Box& near, std::vector<Vec3f>& seen) {
+        const Eigen::Isometry3d motion = obstacle.motion.at(time_of(frame));
+        const std::size_t stride = 1 + obstacle.mesh.positions.size() / 2000;
+        for (std::size_t v = 0; v < obstacle.mesh.positions.size(); v += stride) {
+            const Vec3d p = motion * obstacle.mesh.positions[v].cast<double>();
+            if ((p.array() < near.min.array()).any() || (p.array() > near.max.array()).any()) continue;
+            seen.push_back(p.cast<float>());
+            lowest_obstacle_ = std::min(lowest_obstacle_, p[axis()]);
         }
     }
 
@@ -275,7 +301,7 @@ private:
     std::optional<Drawable> melting_drawable_;
     Box box_; ///< of the bodies, in all frames
     double lowest_obstacle_ = std::numeric_limits<double>::infinity(), ground_level_ = 0;
-    Camera camera_;
+    std::vector<Camera> cameras_; ///< one, or one a frame
 };
 
 } // namespace

@@ -1,4 +1,4 @@
-// Films of scenes: all bodies restored on the GPU, obstacles and the ground, from one camera.
+// Films of scenes: all bodies restored on the GPU, obstacles and the ground, from a camera that follows.
 #pragma once
 
 #include "filigree/present/headless_renderer.h"

@@ -147,9 +147,9 @@ Result<BodyLook> textured_look(const Mesh& mesh, const std::string& mesh_path, d
     if (std::optional<Error> error = mesh_error(mesh)) return *error;
     BodyLook look;
     if (mesh.materials.empty() || !mesh.colors.empty()) return look;
-    const SurfaceMaterials loaded = load_surface_materials(mesh, mesh_path);
+    const SurfaceMaterials loaded = load_surface_materials(mesh, path_of(mesh_path));
     warnings.insert(warnings.end(), loaded.warnings.begin(), loaded.warnings.end());
-    look.materials = read_materials_and_pictures(mesh, mesh_path).materials; // load_surface_materials warned
+    look.materials = read_materials_and_pictures(mesh, path_of(mesh_path)).materials; // load_surface_materials warned
     const Result<Triangulation> triangles = triangulate(mesh, context);
     if (!triangles) return triangles.error();
     TriangleLook triangle(mesh, plain, loaded);

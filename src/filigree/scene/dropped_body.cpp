@@ -183,6 +183,12 @@ HeatSource torch_at(const DroppedBody& dropped, const Vec3d& place, const Torch&
     return source;
 }
 
+World world_of_drop(const DropOptions& options, const Box& box, double scale, const Vec3d& up) {
+    DroppedBody dropped;
+    DropBuilder(options, up, box, scale).build(dropped);
+    return std::move(dropped.world);
+}
+
 Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<const Model> model,
                                                              std::shared_ptr<const BreakingModel> breaking,
                                                              const BodyLook& look, const DropOptions& options,

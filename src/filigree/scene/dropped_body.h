@@ -70,6 +70,9 @@ Result<std::shared_ptr<const DroppedBody>> make_dropped_body(std::shared_ptr<con
                                                              std::span<const Index> pinned, const Vec3d& up,
                                                              const RunContext& context);
 
+/// What such a body falls onto, and its gravity. box: of the mesh, model units. scale: metres a model unit.
+World world_of_drop(const DropOptions& options, const Box& box, double scale, const Vec3d& up);
+
 /// Whether heat does anything to it: it is of mpm and melts.
 bool can_melt(const DroppedBody& dropped);
 /// W/(m^2 K): between a dropped body and the air.

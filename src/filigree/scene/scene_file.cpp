@@ -58,10 +58,9 @@ std::string plain_name(const std::string& text) {
 
 class SceneReader {
 public:
-    explicit SceneReader(const std::string& path) {
+    SceneReader(std::string_view bytes, const std::string& path) {
         scene_.path = path;
-        const std::string bytes = read_file(path).value();
-        if (const bool is_model = is_model_file(bytes); is_model || mesh_format(path))
+        if (const bool is_model = is_model_file(bytes); is_model || mesh_format(path_of(path)))
             throw BadResultAccess(
                 {ErrorCode::bad_file,
                  fmt::format("{}: is a {}, not a scene; a scene is a TOML file that names {}, such as "
@@ -220,7 +219,7 @@ private:
             if (is_taken(name)) in.fail("name", "two bodies are called '" + name + "'");
             return name;
         }
-        const std::string base = plain_name(body.mesh.empty() ? body.shape : fs::path(body.mesh).stem().string());
+        const std::string base = plain_name(body.mesh.empty() ? body.shape : path_of(body.mesh).stem().string());
         std::string name = base;
         for (int number = 2; is_taken(name); ++number) name = fmt::format("{}{}", base, number);
         return name;
@@ -427,8 +426,14 @@ Error scene_error(const SceneFile& scene, unsigned line, ErrorCode code, const s
 }
 
 Result<SceneFile> read_scene(const std::string& path, std::span<const SceneValue> values) {
+    const Result<std::string> bytes = read_file(path_of(path));
+    if (!bytes) return bytes.error();
+    return parse_scene(*bytes, path, values);
+}
+
+Result<SceneFile> parse_scene(std::string_view text, const std::string& path, std::span<const SceneValue> values) {
     try {
-        SceneReader reader(path);
+        SceneReader reader(text, path);
         for (const SceneValue& value : values) reader.set(value);
         return reader.read();
     } catch (const BadResultAccess& failure) {

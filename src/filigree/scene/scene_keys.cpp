@@ -313,6 +313,10 @@ const SceneKey kKeys[] = {
     key<&ScenePicture::target>("picture", "target", "m", kAnything, "point that the camera looks at"),
     key<&ScenePicture::field_of_view>("picture", "field_of_view", "degrees", from(0, 150),
                                       "vertical field of view; 0: parallel projection"),
+    key<&ScenePicture::follow>(
+        "picture", "follow", "", kAnything,
+        "whether the camera moves with the bodies where that shows them at least a third larger; "
+        "a camera with `eye` stands still"),
     key<&ScenePicture::size>("picture", "size", "pixels", from(16, 8192), "width and height"),
     key<&ScenePicture::background>("picture", "background", "", kAnything,
                                    "`\"#rrggbb\"`, or a gradient from top to bottom: `\"#rrggbb,#rrggbb\"`",

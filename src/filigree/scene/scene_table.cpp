@@ -1,6 +1,7 @@
 #include "filigree/scene/scene_table.h"
 
 #include "filigree/core/color.h"
+#include "filigree/file.h"
 
 #include <algorithm>
 #include <cmath>
@@ -212,8 +213,8 @@ private:
     }
     /// A file's name, seen from the scene's folder; it has to be there.
     std::string file_of(const toml::node& node) const {
-        const fs::path named = text_of(node),
-                       path = named.is_absolute() ? named : fs::path(path_).parent_path() / named;
+        const fs::path named = path_of(text_of(node)),
+                       path = named.is_absolute() ? named : path_of(path_).parent_path() / named;
         std::error_code ignored;
         if (!fs::exists(path, ignored))
             fail_at(path_, line_of(node),

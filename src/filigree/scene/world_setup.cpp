@@ -109,7 +109,7 @@ private:
             model.mesh = make_shape(body.shape, body.shape_options).value();
             return model;
         }
-        const std::string bytes = read_file(body.mesh).value();
+        const std::string bytes = read_file(path_of(body.mesh)).value();
         if (is_model_file(bytes)) return read_model(bytes, body.mesh, context_).value();
         model.mesh = mesh_of(bytes, body.mesh);
         return model;
@@ -125,7 +125,7 @@ private:
     }
 
     Mesh obstacle_mesh(const std::string& path) {
-        const std::string bytes = read_file(path).value();
+        const std::string bytes = read_file(path_of(path)).value();
         if (!is_model_file(bytes)) return mesh_of(bytes, path);
         throw BadResultAccess(
             {ErrorCode::bad_file, path + ": is a model where a mesh belongs; write one of its levels as a mesh."});

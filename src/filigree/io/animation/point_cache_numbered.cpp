@@ -45,11 +45,11 @@ Result<std::vector<std::string>> file_names_in(const fs::path& folder) {
 Result<NumberedName> only_name_in(const fs::path& folder, const std::vector<std::string>& files) {
     std::optional<NumberedName> found;
     for (const std::string& file : files) {
-        if (file.starts_with('.') || !mesh_format(file)) continue;
-        const std::string stem = fs::path(file).stem().string();
+        if (file.starts_with('.') || !mesh_format(path_of(file))) continue;
+        const std::string stem = path_of(file).stem().string();
         const std::size_t digits = std::size_t(std::find_if_not(stem.rbegin(), stem.rend(), is_digit) - stem.rbegin());
         if (digits == 0) continue; // a mesh that lies there too, such as the driver at rest
-        const NumberedName name{folder, stem.substr(0, stem.size() - digits), fs::path(file).extension().string()};
+        const NumberedName name{folder, stem.substr(0, stem.size() - digits), path_of(file).extension().string()};
         if (found && (found->before != name.before || found->after != name.after))
             return Error{ErrorCode::usage, folder.string() + ": holds " + found->before + "####" + found->after +
                                                " and " + name.before + "####" + name.after +
@@ -68,9 +68,9 @@ Result<std::vector<fs::path>> numbered_files(const NumberedName& name, const std
     for (const std::string& file : names) {
         const auto number = name.number_of(file);
         if (!number) continue;
-        const auto [known, is_new] = files.emplace(*number, name.folder / file);
+        const auto [known, is_new] = files.emplace(*number, name.folder / path_of(file));
         if (!is_new)
-            return Error{ErrorCode::usage, (name.folder / file).string() + ": has the number of " +
+            return Error{ErrorCode::usage, (name.folder / path_of(file)).string() + ": has the number of " +
                                                known->second.string() + "; keep one of the two."};
     }
     if (files.empty())
@@ -189,7 +189,7 @@ std::vector<fs::path> animation_files(const fs::path& path) {
     std::vector<fs::path> files;
     const Result<std::vector<std::string>> names = file_names_in(folder);
     for (const std::string& file : names ? *names : std::vector<std::string>{})
-        if (!name || name->number_of(file)) files.push_back(folder / file);
+        if (!name || name->number_of(file)) files.push_back(folder / path_of(file));
     return files;
 }
 

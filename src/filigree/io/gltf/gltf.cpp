@@ -84,7 +84,7 @@ void place_rest(gltf::Scene& scene, const RunContext& context) {
 }
 
 std::filesystem::path folder_of(const std::string& name) {
-    const std::filesystem::path folder = std::filesystem::path(name).parent_path();
+    const std::filesystem::path folder = path_of(name).parent_path();
     return folder.empty() ? "." : folder;
 }
 
@@ -93,7 +93,7 @@ Status read_scene(std::string_view bytes, gltf::Scene& scene, const RunContext& 
     try {
         if (bytes.starts_with(kByteOrderMark)) bytes.remove_prefix(kByteOrderMark.size());
         if (context.is_cancelled()) return cancelled_error();
-        scene.document = std::make_unique<gltf::Document>(bytes, folder_of(scene.name), scene.name);
+        scene.document = std::make_unique<gltf::Document>(bytes, folder_of(scene.name), path_of(scene.name));
         check_extensions(scene);
         gltf::read_nodes(scene);
         gltf::read_skins(scene);

@@ -395,10 +395,10 @@ std::filesystem::path Document::beside(const Value& uri, const std::string& name
     if (name.front() == '/') uri.fail(in_quotes(name) + " is an absolute path" + advice);
     if (name.substr(0, name.find('/')).find(':') != std::string::npos)
         uri.fail(in_quotes(name) + " is not a relative path" + advice);
-    for (const fs::path& part : fs::path(name))
+    for (const fs::path& part : path_of(name))
         if (part == "..") uri.fail(in_quotes(name) + " leads out of its folder" + advice);
     std::error_code failed;
-    fs::path path = fs::canonical(folder_ / name, failed);
+    fs::path path = fs::canonical(folder_ / path_of(name), failed);
     if (failed) uri.fail("there is no file " + in_quotes(name) + " beside it.", ErrorCode::not_found);
     const fs::path folder = fs::canonical(folder_, failed);
     const auto [in_folder, in_path] = std::mismatch(folder.begin(), folder.end(), path.begin(), path.end());

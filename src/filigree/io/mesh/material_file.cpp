@@ -92,7 +92,7 @@ private:
         std::replace(text.begin(), text.end(), '\\', '/');
         const bool has_drive = text.size() > 1 && text[1] == ':';
         if (has_drive || text.starts_with('/') || text.find('\0') != std::string::npos) return std::nullopt;
-        const fs::path path = (beside / text).lexically_normal();
+        const fs::path path = (beside / path_of(text)).lexically_normal();
         if (!path.empty() && *path.begin() == "..") return std::nullopt;
         return path;
     }
@@ -296,13 +296,13 @@ public:
 private:
     bool exists(const std::string& name) const {
         std::error_code ignored;
-        return fs::exists(fs::symlink_status(folder_ / name, ignored));
+        return fs::exists(fs::symlink_status(folder_ / path_of(name), ignored));
     }
 
     bool is_ours(const std::string& name) const {
         std::error_code ignored;
-        if (!fs::is_regular_file(folder_ / name, ignored)) return false;
-        const Result<std::string> bytes = read_file(folder_ / name);
+        if (!fs::is_regular_file(folder_ / path_of(name), ignored)) return false;
+        const Result<std::string> bytes = read_file(folder_ / path_of(name));
         return bytes && bytes->starts_with(kOurMark);
     }
 
@@ -319,7 +319,7 @@ private:
     /// Those that the library names which is about to be replaced.
     void find_our_pictures() {
         if (!exists(library_.name)) return;
-        const Result<std::string> bytes = read_file(folder_ / library_.name);
+        const Result<std::string> bytes = read_file(folder_ / path_of(library_.name));
         if (!bytes) return;
         for (TextScanner text(*bytes); !text.at_end(); text.next_line())
             if (text.word() == "map_Kd") our_pictures_.insert(std::string(text.rest_of_line()));

@@ -97,7 +97,7 @@ std::optional<MeshFormat> format_of_content(std::string_view bytes, bool is_cert
 
 Result<MeshFormat> decide_format(std::string_view bytes, const std::string& name) {
     if (const auto format = format_of_content(bytes, true)) return *format;
-    Result<MeshFormat> by_name = mesh_format(name);
+    Result<MeshFormat> by_name = mesh_format(path_of(name));
     if (by_name.ok()) return by_name;
     if (const auto format = format_of_content(bytes, false)) return *format;
     return Error{ErrorCode::unsupported, name +
@@ -195,7 +195,7 @@ Result<std::vector<std::string>> write_obj_with_materials(const Mesh& mesh, cons
     }
     library.files.push_back({path.filename().string(), std::make_shared<const std::string>(std::move(bytes))});
     for (const MaterialLibrary::File& file : library.files) {
-        if (const Status written = write_file(path.parent_path() / file.name, *file.bytes); !written)
+        if (const Status written = write_file(path.parent_path() / path_of(file.name), *file.bytes); !written)
             return written.error();
     }
     return sentences("OBJ", {std::move(lost), std::move(library.warnings)});

@@ -81,6 +81,8 @@ Result<std::string> read_whole(int descriptor, const fs::path& path) {
 
 } // namespace
 
+fs::path path_of(std::string_view utf8) { return platform::native_name(utf8); }
+
 Result<std::string> read_file(const fs::path& path) {
     if (path == "-") return read_whole(platform::kStandardInput, "standard input");
     const FileDescriptor descriptor(platform::open_to_read(path));

@@ -21,10 +21,10 @@ namespace fs = std::filesystem;
 using Kind = platform::Status::Kind;
 
 // What a batch's folder holds.
-constexpr const char* kNew = "new";       // files for their places, under their names
-constexpr const char* kOld = "old";       // what was in the places
-constexpr const char* kLock = "lock";     // locked while its process lives
-constexpr const char* kBefore = "before"; // a Stamp of every place that had a file
+constexpr char kNew[] = "new";       // files for their places, under their names
+constexpr char kOld[] = "old";       // what was in the places
+constexpr char kLock[] = "lock";     // locked while its process lives
+constexpr char kBefore[] = "before"; // a Stamp of every place that had a file
 constexpr std::string_view kMaking = "-making", kPlacing = "-placing";
 
 bool is_batch(const std::string& name, std::string_view state) {
@@ -127,7 +127,7 @@ void keep_permissions(const fs::path& file, const fs::path& target) {
 Status place_rest(const fs::path& batch, const fs::path& folder) {
     const Stamps before = read_stamps(batch / kBefore);
     for (const std::string& name : names_in(batch / kNew)) {
-        const fs::path file = batch / kNew / name, target = folder / name;
+        const fs::path file = batch / kNew / path_of(name), target = folder / path_of(name);
         if (const auto status = platform::status_of_name(target)) {
             const auto known = before.find(name);
             if (status->kind != Kind::file || known == before.end() || known->second != stamp_of(*status)) continue;
@@ -145,7 +145,7 @@ Status place_rest(const fs::path& batch, const fs::path& folder) {
 void remove_batch(const fs::path& batch) {
     std::error_code ignored;
     for (const std::string& part : names_in(batch)) // also what a kill left of writing kBefore
-        if (part != kLock) fs::remove_all(batch / part, ignored);
+        if (part != kLock) fs::remove_all(batch / path_of(part), ignored);
     fs::remove(batch / kLock, ignored);
     fs::remove(batch, ignored);
 }
@@ -181,7 +181,7 @@ public:
     }
 
     const fs::path& target() const { return target_; }
-    fs::path file(const std::string& name) const { return path_ / kNew / name; }
+    fs::path file(const std::string& name) const { return path_ / kNew / path_of(name); }
 
     Status finish() {
         const std::vector<std::string> names = names_in(path_ / kNew);
@@ -209,8 +209,8 @@ private:
     Status prepare(const std::vector<std::string>& names) {
         Stamps before;
         for (const std::string& name : names) {
-            if (Status free = check_target(target_ / name); !free) return free;
-            if (const auto status = platform::status_of_name(target_ / name)) before[name] = stamp_of(*status);
+            if (Status free = check_target(target_ / path_of(name)); !free) return free;
+            if (const auto status = platform::status_of_name(target_ / path_of(name))) before[name] = stamp_of(*status);
         }
         if (Status written = write_file(path_ / kBefore, stamp_bytes(before)); !written) return written;
         platform::flush_folder(path_ / kNew);
@@ -220,7 +220,7 @@ private:
     /// Ends the hidden folder's name so.
     Status rename_to(std::string_view state) {
         const std::string name = path_.filename().string();
-        const fs::path renamed = target_ / name.substr(0, name.rfind('-')).append(state);
+        const fs::path renamed = target_ / path_of(name.substr(0, name.rfind('-')).append(state));
         if (const int failed = platform::rename(path_, renamed)) return cannot_write(target_, failed);
         path_ = renamed;
         platform::flush_folder(target_);
@@ -228,7 +228,7 @@ private:
     }
 
     Status place(const std::string& name) {
-        const fs::path place = target_ / name, before = path_ / kOld / name;
+        const fs::path place = target_ / path_of(name), before = path_ / kOld / path_of(name);
         if (Status free = check_target(place); !free) return free;
         const bool replaces = platform::status_of_name(place).has_value();
         if (replaces) {
@@ -245,9 +245,9 @@ private:
     /// In this order a kill in between is like one while they were placed.
     void take_back() {
         for (auto it = placed_.rbegin(); it != placed_.rend(); ++it) {
-            const fs::path place = target_ / it->name;
+            const fs::path place = target_ / path_of(it->name);
             if (!platform::status_of_name(file(it->name))) platform::rename(place, file(it->name));
-            if (it->replaced) platform::rename(path_ / kOld / it->name, place);
+            if (it->replaced) platform::rename(path_ / kOld / path_of(it->name), place);
         }
         placed_.clear();
         (void)rename_to(kMaking);
@@ -268,14 +268,14 @@ Result<FileBatch> FileBatch::create(const fs::path& folder) {
 }
 
 fs::path FileBatch::path(const std::string& name) const { return folder_->file(name); }
-Status FileBatch::check_place(const std::string& name) const { return check_target(folder_->target() / name); }
+Status FileBatch::check_place(const std::string& name) const { return check_target(folder_->target() / path_of(name)); }
 Status FileBatch::finish() { return folder_->finish(); }
 
 Status complete_batches(const fs::path& folder) {
     for (const std::string& name : names_in(folder)) {
         const bool placing = is_batch(name, kPlacing);
         if (!placing && !is_batch(name, kMaking)) continue;
-        const fs::path batch = folder / name;
+        const fs::path batch = folder / path_of(name);
         const auto status = platform::status_of_name(batch);
         if (!status || status->kind != Kind::folder || !status->is_own) continue;
         const Lock lock(batch / kLock, false);
@@ -292,8 +292,8 @@ std::vector<fs::path> unplaced_files(const fs::path& folder) {
     std::vector<fs::path> unplaced;
     for (const std::string& batch : names_in(folder))
         if (is_batch(batch, kPlacing))
-            for (const std::string& name : names_in(folder / batch / kNew))
-                unplaced.push_back(folder / batch / kNew / name);
+            for (const std::string& name : names_in(folder / path_of(batch) / kNew))
+                unplaced.push_back(folder / path_of(batch) / kNew / path_of(name));
     return unplaced;
 }
 

@@ -18,6 +18,9 @@ using Path = std::filesystem::path;
 
 inline constexpr int kStandardInput = 0, kStandardOutput = 1, kStandardError = 2;
 
+/// A name in UTF-8 in the characters of the system's own calls.
+Path::string_type native_name(std::string_view utf8);
+
 /// What a name or an open file is.
 struct Status {
     enum class Kind { file, folder, link, other } kind = Kind::other; ///< other: a pipe or a device

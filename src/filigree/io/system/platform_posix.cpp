@@ -60,6 +60,8 @@ const char* folder_name(const Path& folder) { return folder.empty() ? "." : fold
 
 } // namespace
 
+Path::string_type native_name(std::string_view utf8) { return Path::string_type(utf8); }
+
 std::optional<Status> status_of(const Path& path) {
     struct stat status {};
     if (::stat(path.c_str(), &status) != 0) return {};

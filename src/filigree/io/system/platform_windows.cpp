@@ -135,6 +135,15 @@ std::string utf8(const wchar_t* text) {
 
 } // namespace
 
+Path::string_type native_name(std::string_view utf8) {
+    if (utf8.empty()) return {};
+    const int bytes = static_cast<int>(utf8.size());
+    const int size = ::MultiByteToWideChar(CP_UTF8, 0, utf8.data(), bytes, nullptr, 0);
+    Path::string_type name(static_cast<std::size_t>(size), L'\0'); // bytes that are no UTF-8: a mark of replacement
+    ::MultiByteToWideChar(CP_UTF8, 0, utf8.data(), bytes, name.data(), size);
+    return name;
+}
+
 std::optional<Status> status_of(const Path& path) { return status_of(path, 0); }
 std::optional<Status> status_of(int descriptor) { return status_of(handle_of(descriptor)); }
 std::optional<Status> status_of_name(const Path& path) { return status_of(path, FILE_FLAG_OPEN_REPARSE_POINT); }

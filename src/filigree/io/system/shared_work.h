@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/context.h"
+#include "filigree/file.h"
 #include "filigree/result.h"
 
 #include <cstddef>
@@ -49,7 +50,7 @@ public:
     /// Puts a file into the folder of which the name says all, unless it is there. Errors: unwritable, also where the
     /// folder is this work's no more, as others finished it.
     Status mark(const std::string& name) const;
-    std::filesystem::path file(const std::string& name) const { return folder_ / name; }
+    std::filesystem::path file(const std::string& name) const { return folder_ / path_of(name); }
     /// Which of these files are there.
     std::vector<bool> are_there(std::span<const std::string> names) const;
     /// What was made is in its place: says so in PATH.plan, and removes the folder. Errors: unwritable.

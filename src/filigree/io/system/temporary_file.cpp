@@ -1,6 +1,7 @@
 #include "filigree/io/system/temporary_file.h"
 
 #include "filigree/core/hash.h"
+#include "filigree/file.h"
 #include "filigree/io/system/file_descriptor.h"
 #include "filigree/io/system/platform.h"
 
@@ -19,7 +20,7 @@ fs::path path_of_bits(const fs::path& folder, std::uint64_t bits, std::string_vi
     constexpr char kDigits[] = "0123456789abcdef";
     std::string name = ".filigree-";
     for (int i = 0; i < 16; ++i, bits >>= 4) name += kDigits[bits & 15];
-    return folder / name.append(suffix);
+    return folder / path_of(name.append(suffix));
 }
 
 /// Removes a file of this user's that nobody has locked. While the lock is ours nobody else takes the name away.
