@@ -35,14 +35,14 @@ ShadowMap::ShadowMap(int side) : depth(make_texture(GL_DEPTH_COMPONENT32F, side,
     framebuffer = make_framebuffer(nullptr, &depth);
 }
 
-Sampler make_nearest_shadow_sampler() {
+Sampler make_depth_sampler() {
     Sampler sampler = Sampler::make();
     const auto set = [&](GLenum what, GLenum to) { glSamplerParameteri(sampler.name(), what, static_cast<GLint>(to)); };
     set(GL_TEXTURE_MIN_FILTER, GL_NEAREST);
     set(GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     set(GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
     set(GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-    set(GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
+    set(GL_TEXTURE_COMPARE_MODE, GL_NONE);
     return sampler;
 }
 

@@ -19,8 +19,8 @@ struct ShadowMap {
     explicit ShadowMap(int side);
 };
 
-/// Looks at a shadow map's nearest place alone, not at the four around: quicker, for what looks many times.
-Sampler make_nearest_shadow_sampler();
+/// Gives a shadow map's depth at the nearest place, without a comparison.
+Sampler make_depth_sampler();
 
 /// A colour and a depth of several samples a pixel.
 struct Multisampled {

@@ -81,11 +81,11 @@ Result<Renderer> Renderer::create() {
         link(frame + shaders::points_vertex, points + shaders::preview_lighting + shaders::points_fragment);
     content->copy = link(shaders::cover_vertex, shaders::copy_fragment);
     content->preview_background = link(shaders::cover_vertex, shaders::preview_background);
-    content->ground = link(frame + shaders::ground_vertex, frame + lighting + shaders::ground_fragment);
+    content->ground = link(frame + shaders::ground_vertex, frame + shaders::ground_fragment);
     content->add = link(shaders::cover_vertex, shaders::add_fragment);
     content->show = link(shaders::cover_vertex, shaders::show_fragment);
     content->nothing = gl::VertexArray::make();
-    content->ground_sampler = gl::make_nearest_shadow_sampler();
+    content->ground_sampler = gl::make_depth_sampler();
     Result<gl::Buffer> buffer = gl::make_buffer(nullptr, sizeof(FrameBlock));
     if (!buffer) return buffer.error();
     content->frame_buffer = std::move(buffer).value();
@@ -260,7 +260,7 @@ FrameBlock Renderer::Content::frame(unsigned number) const {
     put(block.ground,
         {kKeyLight * std::max(0.0, up.dot(key)) / ground_light, kSkyLight * std::max(0.0, up.dot(sky)) / ground_light,
          kGroundDarkness},
-        0);
+        1 / std::sqrt(double(passes)));
     return block;
 }
 

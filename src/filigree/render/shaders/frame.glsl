@@ -10,7 +10,7 @@ layout(std140, binding = 0) uniform Frame {
     vec4 up;                     // w: level of the ground
     vec4 viewport;               // width, height in pixels; z: number of the pass; w: 1 in a shadow pass
     vec4 strength;               // of the light: key, sky, fill, bounce from the ground
-    vec4 ground;                 // shares of this pass's light on the ground: key, sky; z: how dark shadow may be
+    vec4 ground;                 // shares of this pass's light on the ground: key, sky; z: how dark shadow may be; w: 1 / sqrt(passes)
 } frame;
 
 vec3 to_viewer(vec3 position) {
