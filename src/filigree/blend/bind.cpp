@@ -1,5 +1,6 @@
 // Labels spread along shortest paths over the mesh's edges, so that a vertex is near its label along the surface,
-// not through it. The walk compares a triangle with all that share a corner with it.
+// not through it. The walk compares a triangle with all that share a corner with it, and before it ends far from the
+// surface with those around these.
 #include "filigree/blend/bind.h"
 
 #include "filigree/core/parallel_for.h"
@@ -34,6 +35,10 @@ CellShape cell_shape(const Vec3f& a, const Vec3f& b, const Vec3f& c) {
 constexpr double kAwayCost = 4;
 constexpr double kAwayStart = 0.25; // and how far off it counts where it touches, in radii of the cell
 
+/// From which distance on, in radii of the cell, the walk looks one ring further before it ends: on a bent driver a
+/// cell may be closer than all around it, and far from the closest.
+constexpr double kFarStart = 0.3;
+
 /// The walk of one vertex over the driver's triangles.
 class Walk {
 public:
@@ -58,6 +63,10 @@ public:
         for (Index at = kNoIndex; at != best.point.triangle;) {
             at = best.point.triangle;
             for (Index corner : cells_[at]) visit_ring(corner, p, normal, best);
+            if (best.point.triangle == at && best.cost > kFarStart * double(shapes_[at].radius))
+                for (Index corner : cells_[at])
+                    for (Index t : around_[corner])
+                        for (Index beyond : cells_[t]) visit_ring(beyond, p, normal, best);
         }
         return best;
     }
