@@ -185,6 +185,22 @@ flg_status flg_restore_parts(const flg_model* model, const void* pose, uint32_t 
 flg_status flg_get_part(const flg_model* model, uint32_t part, uint32_t* first_vertex, uint32_t* vertices,
                         uint32_t* first_normal, uint32_t* normals);
 
+/* ---- For graphics cards ----
+ * A restore is a linear skin, so a vertex shader can do it: vertex v goes to
+ *     sum over k = 0, 1, 2 of weights[3 v + k] * (matrix of drivers[3 v + k]) * (points of v, 1)
+ * Normals turn with the cofactor of the sum of the matrices, from those of a restore at rest. A card rounds otherwise,
+ * so it does not give the same bytes. */
+
+/* The skin of vertices first to first + count - 1. drivers: 3 driver vertices each, which may be the same. weights: 3
+ * each, with the sum 1. points: 3 floats each; these are not rest positions. Items are written from the first on.
+ * Cost: O(count log count). Errors: ARGUMENT (first + count is more than flg_info.vertices). */
+flg_status flg_skin(const flg_model* model, uint32_t first, uint32_t count, uint32_t* drivers, float* weights,
+                    float* points);
+
+/* A pose as matrices: 16 floats a driver vertex, column by column, the last row 0 0 0 1.
+ * Errors: ARGUMENT (NULL, or a pose of another model). */
+flg_status flg_skin_matrices(const flg_model* model, const void* pose, float* matrices);
+
 #ifdef __cplusplus
 }
 #endif

@@ -1155,3 +1155,65 @@ flg_status flg_get_part(const flg_model* model, uint32_t part, uint32_t* first_v
     }
     return FLG_OK;
 }
+
+/* ---- For graphics cards ---- */
+
+/* The last of runs begin to end - 1 that begins at a record or before it. */
+static const flg_run* run_of(const flg_run* runs, uint32_t begin, uint32_t end, uint32_t record) {
+    while (end - begin > 1) {
+        const uint32_t middle = begin + (end - begin) / 2;
+        if (runs[middle].first <= record)
+            begin = middle;
+        else
+            end = middle;
+    }
+    return runs + begin;
+}
+
+flg_status flg_skin(const flg_model* model, uint32_t first, uint32_t count, uint32_t* drivers, float* weights,
+                    float* points) {
+    const flg_record_set* set;
+    const flg_records* records;
+    if (!model || !drivers || !weights || !points) return FLG_ARGUMENT;
+    if (first > model->info.vertices || count > model->info.vertices - first) return FLG_ARGUMENT;
+    set = &model->vertices;
+    records = &set->records;
+    for (uint32_t v = first; v < first + count; ++v, drivers += 3, weights += 3, points += 3) {
+        const uint32_t *runs = set->block_runs + v / FLG_BLOCK,
+                       record = records->runs[runs[0]].first + (uint32_t)set->from[v];
+        const uint32_t cell = run_of(records->runs, runs[0], runs[1], record)->cell;
+        const float u = records->u16 ? flg_weight_of(records->u16[record]) : records->u[record],
+                    w = records->u16 ? flg_weight_of(records->v16[record]) : records->v[record];
+        memcpy(drivers, records->cells + 3 * (size_t)cell, 3 * sizeof *drivers);
+        weights[0] = 1 - u - w;
+        weights[1] = u;
+        weights[2] = w;
+        for (size_t k = 0; k < 3; ++k) {
+            double q;
+            if (records->u16) {
+                q = (double)records->scale[cell] * (double)records->offset[k][record];
+                for (size_t c = 0; c < 3; ++c)
+                    q += 0.5 * (double)weights[c] * model->inner_rest[3 * (size_t)drivers[c] + k];
+            } else {
+                q = (double)records->q[k][record];
+            }
+            points[k] = (float)(q / model->inner_scale);
+        }
+    }
+    return FLG_OK;
+}
+
+flg_status flg_skin_matrices(const flg_model* model, const void* pose, float* matrices) {
+    const flg_pose* set = (const flg_pose*)pose;
+    const flg_transform* transforms;
+    if (!model || !pose || !matrices || set->model != model) return FLG_ARGUMENT;
+    transforms = transforms_in((void*)(uintptr_t)pose);
+    for (size_t i = 0; i < model->info.driver_vertices; ++i, matrices += 16)
+        for (size_t column = 0; column < 4; ++column) {
+            const float* from = column < 3 ? transforms[i].a + 3 * column : transforms[i].t;
+            for (size_t k = 0; k < 3; ++k)
+                matrices[4 * column + k] = column < 3 ? from[k] : from[k] * set->scales.position;
+            matrices[4 * column + 3] = column < 3 ? 0.0f : 1.0f;
+        }
+    return FLG_OK;
+}

@@ -480,6 +480,21 @@ TEST(RuntimeStatus, WrongArguments) {
     EXPECT_EQ(flg_get_part(m, info.parts, nullptr, nullptr, nullptr, nullptr), FLG_ARGUMENT);
     EXPECT_EQ(flg_get_part(nullptr, 0, nullptr, nullptr, nullptr, nullptr), FLG_ARGUMENT);
     EXPECT_EQ(flg_get_part(m, 0, nullptr, nullptr, nullptr, nullptr), FLG_OK);
+    std::vector<std::uint32_t> skin_drivers(3 * std::size_t{info.vertices});
+    const auto skin = [&](const flg_model* of, std::uint32_t first, std::uint32_t count) {
+        return flg_skin(of, first, count, skin_drivers.data(), floats(out), floats(out));
+    };
+    EXPECT_EQ(skin(nullptr, 0, 0), FLG_ARGUMENT);
+    EXPECT_EQ(skin(m, 1, info.vertices), FLG_ARGUMENT);
+    EXPECT_EQ(skin(m, 0xffffffffu, 2), FLG_ARGUMENT);
+    EXPECT_EQ(skin(m, info.vertices, 0), FLG_OK);
+    EXPECT_EQ(flg_skin(m, 0, 0, nullptr, floats(out), floats(out)), FLG_ARGUMENT);
+    EXPECT_EQ(flg_skin(m, 0, 0, skin_drivers.data(), nullptr, floats(out)), FLG_ARGUMENT);
+    EXPECT_EQ(flg_skin(m, 0, 0, skin_drivers.data(), floats(out), nullptr), FLG_ARGUMENT);
+    EXPECT_EQ(flg_skin_matrices(nullptr, set.get(), gradients), FLG_ARGUMENT);
+    EXPECT_EQ(flg_skin_matrices(m, nullptr, gradients), FLG_ARGUMENT);
+    EXPECT_EQ(flg_skin_matrices(m, set.get(), nullptr), FLG_ARGUMENT);
+    EXPECT_EQ(flg_skin_matrices(twin.get(), set.get(), gradients), FLG_ARGUMENT); // another's pose
     EXPECT_EQ(flg_read_frame(m, bytes.data(), bytes.size(), 0, nullptr, nullptr), FLG_ARGUMENT);
     EXPECT_EQ(flg_read_frame(nullptr, bytes.data(), bytes.size(), 0, floats(out), nullptr), FLG_ARGUMENT);
     EXPECT_EQ(flg_read_frame(m, nullptr, bytes.size(), 0, floats(out), nullptr), FLG_ARGUMENT);

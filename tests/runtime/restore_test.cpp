@@ -3,6 +3,7 @@
 
 #include "filigree/blend/blend_code.h"
 
+#include <array>
 #include <cstring>
 #include <thread>
 
@@ -185,6 +186,39 @@ TEST(RuntimeRestore, ACollapsedDriverGivesFiniteNumbers) {
     const RuntimeMesh out = restore_all(opened, pose);
     for (const Vec3f& p : out.positions) ASSERT_TRUE(p.allFinite());
     for (const Vec3f& n : out.normals) ASSERT_TRUE(n.allFinite());
+}
+
+TEST(RuntimeSkin, IsARestore) {
+    for (const auto& [name, model] : models_of_every_kind())
+        for (const std::uint32_t level : {FLG_FINEST, 0u}) {
+            SCOPED_TRACE(name + (level == 0 ? ", driver" : ""));
+            const Opened opened = open_model(write_model(model), options_of(0, level));
+            const flg_info info = info_of(opened);
+            const Pose pose = random_pose(model, 5);
+            const SetPose set(opened, pose);
+            std::vector<std::array<float, 16>> matrices(info.driver_vertices);
+            ASSERT_EQ(flg_skin_matrices(opened.get(), set.get(), matrices[0].data()), FLG_OK);
+            std::vector<std::array<std::uint32_t, 3>> drivers(info.vertices);
+            std::vector<Vec3f> weights(info.vertices), points(info.vertices), moved(info.vertices);
+            const std::uint32_t half = info.vertices / 2;
+            ASSERT_EQ(flg_skin(opened.get(), 0, half, drivers[0].data(), floats(weights), floats(points)), FLG_OK);
+            ASSERT_EQ(flg_skin(opened.get(), half, info.vertices - half, drivers[half].data(), weights[half].data(),
+                               points[half].data()),
+                      FLG_OK);
+            for (std::uint32_t v = 0; v < info.vertices; ++v) {
+                Vec3d sum = Vec3d::Zero();
+                for (int k = 0; k < 3; ++k) {
+                    ASSERT_LT(drivers[v][k], info.driver_vertices);
+                    const Eigen::Map<const Eigen::Matrix4f> matrix(matrices[drivers[v][k]].data());
+                    ASSERT_EQ(matrix.row(3), Eigen::RowVector4f(0, 0, 0, 1));
+                    sum += double(weights[v][k]) *
+                           (matrix.cast<double>() * points[v].cast<double>().homogeneous()).head<3>();
+                }
+                moved[v] = sum.cast<float>();
+                EXPECT_NEAR(weights[v].sum(), 1, 1e-6);
+            }
+            EXPECT_LT(distance(moved, restore_all(opened, pose).positions).max, 1e-6);
+        }
 }
 
 TEST(RuntimeGradients, AreTheLibrarysInAnyRange) {
