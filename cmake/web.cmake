@@ -14,7 +14,7 @@ target_compile_definitions(filigree_cli PRIVATE FILIGREE_WEB_FROM_PROGRAM="${web
 
 if(FILIGREE_NODE AND bundler)
   cmake_path(SET web_folder NORMALIZE ${CMAKE_RUNTIME_OUTPUT_DIRECTORY}/${web_from_program})
-  file(GLOB web_sources CONFIGURE_DEPENDS ${web}/src/*.js)
+  file(GLOB web_sources CONFIGURE_DEPENDS ${web}/src/*.js ${web}/filigree/three_skin.js)
 
   # The library's decoder for the page, with nothing of the system in it.
   set(decoder ${CMAKE_CURRENT_BINARY_DIR}/web/decoder.wasm)

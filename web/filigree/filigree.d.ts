@@ -66,6 +66,13 @@ export class Model {
     restore(driver: Float32Array, options?: RestoreOptions): this;
     /** 9 numbers a driver vertex: what restore uses where no gradients are given. */
     estimateGradients(driver: Float32Array): Float32Array;
+    /**
+     * A restore as a linear skin, for vertex shaders: vertex v goes to the sum over k = 0, 1, 2 of weights[3 v + k] *
+     * matrix drivers[3 v + k] * (points of v, 1). 3 numbers a vertex each. Points are not rest positions.
+     */
+    skin(): { drivers: Uint32Array; weights: Float32Array; points: Float32Array };
+    /** The matrices of the skin in a pose, 16 numbers a driver vertex, column by column: a view, overwritten later. */
+    skinMatrices(driver: Float32Array, gradients?: Float32Array | null): Float32Array;
     /** A pose of the file, 0 to info.frames - 1. */
     frame(k: number): { driver: Float32Array; gradients: Float32Array | null };
 }

@@ -7,6 +7,7 @@ const WITHOUT_NORMALS = 2, WITHOUT_TRIANGLES = 4, WITHOUT_FIT = 8; // flg_option
 const OPTIONS_BYTES = 28, INFO_BYTES = 96; // of flg_options and flg_info with pointers of 32 bits
 const INFO = ["vertices", "normals", "normalSource", "triangles", "faces", "driverVertices", "driverTriangles", "levels",
     "level", "parts", "frames", "framesHaveGradients", "int16Records", "hasFit", "lanes"];
+const SKIN_STEP = 16384; // vertices; their skin fits into the memory of a restore
 const NORMAL_SOURCES = ["none", "vertex", "corner", "computed"];
 
 function bytesOf(base64) {
@@ -114,7 +115,7 @@ export class Model {
         const { driverVertices, vertices, normals } = this.info;
         const sizes = { driver: 12 * driverVertices, gradients: 36 * driverVertices,
             pose: calls.flg_pose_bytes(this.#model), scratch: calls.flg_scratch_bytes(this.#model),
-            positions: 12 * vertices, normals: 12 * normals };
+            matrices: 64 * driverVertices, positions: 12 * vertices, normals: 12 * normals };
         for (const name in sizes) this.#at[name] = this.#take(sizes[name]); // after this no memory grows
     }
 
@@ -143,19 +144,46 @@ export class Model {
     get triangleFaces() { return this.#indices(this.#calls.flg_triangle_faces(this.#model), this.info.triangles); }
     get levelVertices() { return this.#indices(this.#calls.flg_level_vertices(this.#model), this.info.vertices); }
 
-    /** Restores the mesh where its driver is at `driver`. Results are in model.positions and model.normals. */
-    restore(driver, { gradients = null, positions = true, normals = this.info.normals > 0 } = {}) {
+    #setPose(driver, gradients) {
         const { driverVertices } = this.info;
         const at = this.#at;
         this.#floats(at.driver, 3 * driverVertices).set(floats(driver, 3 * driverVertices, "The driver"));
         if (gradients)
             this.#floats(at.gradients, 9 * driverVertices).set(floats(gradients, 9 * driverVertices, "The gradients"));
         this.#check(this.#calls.flg_set_pose(this.#model, at.driver, gradients ? at.gradients : 0, driverVertices, at.pose));
+    }
+
+    /** Restores the mesh where its driver is at `driver`. Results are in model.positions and model.normals. */
+    restore(driver, { gradients = null, positions = true, normals = this.info.normals > 0 } = {}) {
+        const at = this.#at;
+        this.#setPose(driver, gradients);
         this.#check(this.#calls.flg_restore(this.#model, at.pose, positions ? at.positions : 0, normals ? at.normals : 0,
             at.scratch));
         if (positions instanceof Float32Array) floats(positions, 3 * this.info.vertices, "`positions`").set(this.positions);
         if (normals instanceof Float32Array) floats(normals, 3 * this.info.normals, "`normals`").set(this.normals);
         return this;
+    }
+
+    /** A restore as a linear skin, for vertex shaders: 3 driver vertices, 3 weights and a point for each vertex. */
+    skin() {
+        const { vertices } = this.info, at = this.#at.scratch;
+        const drivers = new Uint32Array(3 * vertices), weights = new Float32Array(3 * vertices);
+        const points = new Float32Array(3 * vertices);
+        for (let first = 0; first < vertices; first += SKIN_STEP) {
+            const count = Math.min(SKIN_STEP, vertices - first), bytes = 12 * count;
+            this.#check(this.#calls.flg_skin(this.#model, first, count, at, at + bytes, at + 2 * bytes));
+            drivers.set(this.#indices(at, 3 * count), 3 * first);
+            weights.set(this.#floats(at + bytes, 3 * count), 3 * first);
+            points.set(this.#floats(at + 2 * bytes, 3 * count), 3 * first);
+        }
+        return { drivers, weights, points };
+    }
+
+    /** The matrices of that skin in a pose: 16 numbers a driver vertex. A view, overwritten by the next call. */
+    skinMatrices(driver, gradients = null) {
+        this.#setPose(driver, gradients);
+        this.#check(this.#calls.flg_skin_matrices(this.#model, this.#at.pose, this.#at.matrices));
+        return this.#floats(this.#at.matrices, 16 * this.info.driverVertices);
     }
 
     /** The gradients that a pose without any is restored with. */

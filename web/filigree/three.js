@@ -1,5 +1,68 @@
-// A geometry of three.js that follows a model's driver. Restored on the processor, in WebAssembly.
-import { BufferAttribute, BufferGeometry, DynamicDrawUsage } from "three";
+// What follows a model's driver in three.js: a mesh restored in the vertex shader, and a geometry restored on the
+// processor, in WebAssembly.
+import { Box3, BufferAttribute, BufferGeometry, DynamicDrawUsage } from "three";
+import { DrivenMesh, DriverSkeleton } from "./three_skin.js";
+
+export { correctSkinNormals } from "./three_skin.js";
+
+const MOST_SMALL_INDICES = 65536;
+
+/** Restored in the vertex shader: each frame uploads 64 bytes a driver vertex. */
+export class RestoredMesh extends DrivenMesh {
+    #reach; // of the mesh from its driver
+
+    /** model: a Model that was opened with triangles. material: one of three.js, or an array of them. */
+    constructor(model, material) {
+        const { geometry, reach } = skinnedGeometry(model);
+        super(geometry, material, new DriverSkeleton(model.info.driverVertices));
+        this.model = model;
+        this.#reach = reach;
+        this.update(model.driverRest);
+    }
+
+    /** Moves the mesh to where the driver is, with gradients where there are any. */
+    update(driver, gradients = null) {
+        this.skeleton.set(this.model.skinMatrices(driver.slice(), gradients));
+        new Box3().setFromArray(driver).getBoundingSphere(this.boundingSphere);
+        this.boundingSphere.radius += 2 * this.#reach; // twice: detail may be stretched
+        return this;
+    }
+}
+
+function skinnedGeometry(model) {
+    const { drivers, weights, points } = model.skin();
+    const { corners, index } = drawnVertices(model);
+    const count = corners ? corners.vertex.length : model.info.vertices;
+    const joint = new (model.info.driverVertices <= MOST_SMALL_INDICES ? Uint16Array : Float32Array)(4 * count);
+    const weight = new Float32Array(4 * count), position = new Float32Array(3 * count);
+    const normal = model.info.normals > 0 ? new Float32Array(3 * count) : null;
+    const rest = restOf(model), driver = model.driverRest;
+    let reach = 0;
+    for (let k = 0; k < count; ++k) {
+        const v = corners ? corners.vertex[k] : k, nearest = 3 * drivers[3 * v];
+        for (let i = 0; i < 3; ++i) {
+            joint[4 * k + i] = drivers[3 * v + i];
+            weight[4 * k + i] = weights[3 * v + i];
+        }
+        reach = Math.max(reach, Math.hypot(...[0, 1, 2].map((i) => rest[3 * v + i] - driver[nearest + i])));
+    }
+    copyPoints(points, corners?.vertex, position);
+    if (normal) copyPoints(model.normals, corners?.normal, normal);
+    const geometry = new BufferGeometry().setIndex(new BufferAttribute(index, 1));
+    geometry.setAttribute("position", new BufferAttribute(position, 3)); // of the skin: the shader makes places of them
+    if (normal) geometry.setAttribute("normal", new BufferAttribute(normal, 3));
+    if (model.uvs) geometry.setAttribute("uv", new BufferAttribute(drawnUvs(model, corners, count), 2));
+    geometry.setAttribute("skinIndex", new BufferAttribute(joint, 4));
+    geometry.setAttribute("skinWeight", new BufferAttribute(weight, 4));
+    return { geometry, reach };
+}
+
+/** Positions at rest; model.normals has the normals. */
+function restOf(model) {
+    const gradients = new Float32Array(9 * model.info.driverVertices);
+    for (let k = 0; k < gradients.length; ++k) gradients[k] = k % 9 % 4 === 0 ? 1 : 0;
+    return model.restore(model.driverRest.slice(), { gradients }).positions;
+}
 
 /** One vertex for each pair of a vertex and its normal and UV, where corners have their own; else the model's. */
 export class RestoredGeometry extends BufferGeometry {

@@ -2,7 +2,6 @@
 import { make_driver } from './driver.js';
 import { count_text, facts_of, size_text, sizes_of } from './facts.js';
 import { load_bytes, Model } from './model.js';
-import { correct_skinned_normals } from './normals.js';
 import { Stage } from './stage.js';
 import { StreamModel } from './stream_model.js';
 import { Wireframe } from './wireframe.js';
@@ -328,7 +327,6 @@ function text_in(name, text) {
 
 async function open() {
   try {
-    correct_skinned_normals();
     const is_stream = document.documentElement.dataset.model === 'stream';
     const model = is_stream ? await StreamModel.load() : await Model.load(await load_bytes());
     window.filigree = new Page(model);

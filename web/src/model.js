@@ -1,5 +1,6 @@
 // The model: its bytes, its levels of detail, its animations, and how far they reach.
 import * as THREE from 'three';
+import { correctSkinNormals } from '../filigree/three_skin.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 
 const kFramingMoments = 32, kFramingVertices = 1500;
@@ -175,6 +176,7 @@ function level_of(nodes) {
 
 /// Materials are kept; only what a file left open is chosen here.
 function prepare(material) {
+  correctSkinNormals(material);
   material.side = THREE.DoubleSide; // cloth has two, and a mirrored part shows its inside
   material.shadowSide = THREE.DoubleSide;
   const is_default = material.userData.filigree === 'none' || (!material.name && material.metalness === 1 && !material.map);

@@ -1,5 +1,6 @@
 // What a stream's surface looks like: one material for each that its file names, pictures when they have come.
 import * as THREE from 'three';
+import { correctSkinNormals } from '../filigree/three_skin.js';
 
 const kMaterialBytes = 32, kNone = 0xffffffff;
 const kSides = { side: THREE.DoubleSide, shadowSide: THREE.DoubleSide }; // cloth has two, and a mirrored part shows its inside
@@ -10,7 +11,7 @@ export class StreamMaterials {
     const made = new StreamMaterials();
     made.file = file;
     made.plain = new THREE.MeshStandardMaterial({ color: 0xb9a58c, metalness: 0, roughness: 0.62, ...kSides });
-    made.all = [made.plain];
+    made.all = [correctSkinNormals(made.plain)];
     made.pictures = []; // [{ section, materials }]
     const records = await file.view('mat.emb');
     for (let at = 0; at + kMaterialBytes <= records.byteLength; at += kMaterialBytes) made.add(records, at);
@@ -22,7 +23,7 @@ export class StreamMaterials {
     const color = new THREE.Color().setRGB(real(0), real(1), real(2), THREE.SRGBColorSpace), opacity = real(3);
     const material = new THREE.MeshStandardMaterial({ color, opacity, transparent: opacity < 1, roughness: real(5),
       metalness: Math.min(real(4), 0.4), ...kSides }); // there are no surroundings to mirror
-    this.all.splice(-1, 0, material);
+    this.all.splice(-1, 0, correctSkinNormals(material));
     if (picture === kNone) return;
     const known = this.pictures.find(({ section }) => section === picture);
     if (known) known.materials.push(material);

@@ -1,5 +1,6 @@
 // A model that comes level by level, and moves from its first level on.
 import * as THREE from 'three';
+import { DrivenMesh, DriverSkeleton } from '../filigree/three_skin.js';
 import { Decoder } from './decoder.js';
 import { NearLevels } from './near_levels.js';
 import { StreamFile } from './stream_file.js';
@@ -7,41 +8,6 @@ import { StreamMaterials } from './stream_materials.js';
 
 const kFramingMoments = 32;
 const kPause = 120; // milliseconds between two choices of what is drawn: memory is moved
-
-/// Matrices of the driver's vertices as a skeleton's: there are no bones.
-class DriverSkeleton extends THREE.Skeleton {
-  constructor(count) {
-    super([]);
-    const side = Math.max(4, 4 * Math.ceil(Math.sqrt(4 * count) / 4));
-    this.boneMatrices = new Float32Array(4 * side * side);
-    this.boneTexture = new THREE.DataTexture(this.boneMatrices, side, side, THREE.RGBAFormat, THREE.FloatType);
-    this.boneTexture.needsUpdate = true;
-    this.boneCount = count;
-  }
-  init() {}
-  update() {}
-  computeBoneTexture() { return this; }
-  set(matrices) {
-    this.boneMatrices.set(matrices);
-    this.boneTexture.needsUpdate = true;
-  }
-}
-
-class DrivenMesh extends THREE.SkinnedMesh {
-  /// Where a vertex is in the present pose.
-  getVertexPosition(vertex, target) {
-    const { position, skinIndex, skinWeight } = this.geometry.attributes, at = this.skeleton.boneMatrices;
-    const x = position.getX(vertex), y = position.getY(vertex), z = position.getZ(vertex);
-    target.set(0, 0, 0);
-    for (let k = 0; k < 3; ++k) {
-      const m = 16 * skinIndex.getComponent(vertex, k), weight = skinWeight.getComponent(vertex, k);
-      target.x += weight * (at[m] * x + at[m + 4] * y + at[m + 8] * z + at[m + 12]);
-      target.y += weight * (at[m + 1] * x + at[m + 5] * y + at[m + 9] * z + at[m + 13]);
-      target.z += weight * (at[m + 2] * x + at[m + 6] * y + at[m + 10] * z + at[m + 14]);
-    }
-    return target;
-  }
-}
 
 /// sRGB bytes as linear numbers, which shaders mix.
 function linear_colors(bytes) {
@@ -150,9 +116,7 @@ export class StreamModel {
     geometry.setAttribute('skinIndex', new THREE.BufferAttribute(joints, 4));
     geometry.setAttribute('skinWeight', new THREE.BufferAttribute(weights, 4, true));
     geometry.setIndex(new THREE.BufferAttribute(this.decoder.driver_triangles.slice(), 1));
-    const mesh = new DrivenMesh(geometry, this.materials.plain);
-    mesh.bind(this.skeleton, new THREE.Matrix4());
-    return mesh;
+    return new DrivenMesh(geometry, this.materials.plain, this.skeleton);
   }
 
   /// Fetches the next level and puts it in front; false: all are there.
@@ -212,10 +176,10 @@ export class StreamModel {
   }
 
   mesh(geometry) {
-    const mesh = this.skeleton ? new DrivenMesh(geometry, this.materials.plain) : new THREE.Mesh(geometry, this.materials.plain);
-    if (this.skeleton) mesh.bind(this.skeleton, new THREE.Matrix4());
+    const { plain } = this.materials;
+    const mesh = this.skeleton ? new DrivenMesh(geometry, plain, this.skeleton) : new THREE.Mesh(geometry, plain);
     mesh.frustumCulled = false;
-    mesh.boundingSphere = new THREE.Sphere(); // three.js would ask every vertex where it is
+    mesh.boundingSphere ??= new THREE.Sphere(); // three.js would ask every vertex where it is
     mesh.castShadow = mesh.receiveShadow = true;
     mesh.visible = false;
     this.scene.add(mesh);
