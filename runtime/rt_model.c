@@ -1170,8 +1170,8 @@ static const flg_run* run_of(const flg_run* runs, uint32_t begin, uint32_t end, 
     return runs + begin;
 }
 
-flg_status flg_skin(const flg_model* model, uint32_t first, uint32_t count, uint32_t* drivers, float* weights,
-                    float* points) {
+FLG_COLD flg_status flg_skin(const flg_model* model, uint32_t first, uint32_t count, uint32_t* drivers, float* weights,
+                             float* points) {
     const flg_record_set* set;
     const flg_records* records;
     if (!model || !drivers || !weights || !points) return FLG_ARGUMENT;
@@ -1203,7 +1203,7 @@ flg_status flg_skin(const flg_model* model, uint32_t first, uint32_t count, uint
     return FLG_OK;
 }
 
-flg_status flg_skin_matrices(const flg_model* model, const void* pose, float* matrices) {
+FLG_COLD flg_status flg_skin_matrices(const flg_model* model, const void* pose, float* matrices) {
     const flg_pose* set = (const flg_pose*)pose;
     const flg_transform* transforms;
     if (!model || !pose || !matrices || set->model != model) return FLG_ARGUMENT;

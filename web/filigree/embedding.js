@@ -45,6 +45,14 @@ function connected(start, around, wanted) {
     return [...seen].sort((a, b) => a - b);
 }
 
+function swapRows(matrix, width, r, s) {
+    for (let c = 0; c < width; ++c) {
+        const kept = matrix[r * width + c];
+        matrix[r * width + c] = matrix[s * width + c];
+        matrix[s * width + c] = kept;
+    }
+}
+
 /** Solves a x = b for the columns of b; both by rows, overwritten. False: singular. */
 function solve(a, b, size, columns) {
     for (let k = 0; k < size; ++k) {
@@ -52,9 +60,8 @@ function solve(a, b, size, columns) {
         for (let r = k + 1; r < size; ++r) if (Math.abs(a[r * size + k]) > Math.abs(a[best * size + k])) best = r;
         if (!(Math.abs(a[best * size + k]) > SMALLEST_PIVOT)) return false;
         if (best !== k) {
-            for (let c = k; c < size; ++c) [a[k * size + c], a[best * size + c]] = [a[best * size + c], a[k * size + c]];
-            for (let c = 0; c < columns; ++c)
-                [b[k * columns + c], b[best * columns + c]] = [b[best * columns + c], b[k * columns + c]];
+            swapRows(a, size, k, best);
+            swapRows(b, columns, k, best);
         }
         for (let r = k + 1; r < size; ++r) {
             const factor = a[r * size + k] / a[k * size + k];
@@ -72,6 +79,7 @@ function solve(a, b, size, columns) {
     return true;
 }
 
+const length = (x, y, z) => Math.sqrt(x * x + y * y + z * z); // hypot is many times slower
 const polynomials = ([x, y, z]) => [1, x, y, z, x * x, y * y, z * z, x * y, y * z, z * x];
 
 export class Embedding {
@@ -107,19 +115,24 @@ export class Embedding {
     follow(points) {
         if (points.length !== 3 * this.#pointCount)
             throw new Error(`The embedding has ${this.#pointCount} points, and ${points.length / 3} are given.`);
-        const weights = this.#weights;
-        for (let v = 0; v < this.positions.length / 3; ++v) {
-            const first = points.subarray(3 * this.#near[NEAR * v], 3 * this.#near[NEAR * v] + 3);
-            const sums = new Float64Array(12);
-            for (let j = 0; j < NEAR; ++j) {
-                const k = 3 * this.#near[NEAR * v + j], w = 4 * (NEAR * v + j);
-                for (let i = 0; i < 3; ++i) { // differences: a body far from the origin keeps its digits
-                    const moved = points[k + i] - first[i];
-                    for (let c = 0; c < 4; ++c) sums[3 * c + i] += weights[w + c] * moved;
-                }
+        const weights = this.#weights, near = this.#near, { positions, gradients } = this;
+        for (let v = 0; v < positions.length / 3; ++v) {
+            const first = 3 * near[NEAR * v], x0 = points[first], y0 = points[first + 1], z0 = points[first + 2];
+            let x = 0, y = 0, z = 0, ax = 0, ay = 0, az = 0, bx = 0, by = 0, bz = 0, cx = 0, cy = 0, cz = 0;
+            for (let j = 1; j < NEAR; ++j) { // differences: a body far from the origin keeps its digits
+                const k = 3 * near[NEAR * v + j], w = 4 * (NEAR * v + j);
+                const dx = points[k] - x0, dy = points[k + 1] - y0, dz = points[k + 2] - z0;
+                const place = weights[w], a = weights[w + 1], b = weights[w + 2], c = weights[w + 3];
+                x += place * dx, y += place * dy, z += place * dz;
+                ax += a * dx, ay += a * dy, az += a * dz;
+                bx += b * dx, by += b * dy, bz += b * dz;
+                cx += c * dx, cy += c * dy, cz += c * dz;
             }
-            for (let i = 0; i < 3; ++i) this.positions[3 * v + i] = first[i] + sums[i];
-            for (let i = 0; i < 9; ++i) this.gradients[9 * v + i] = sums[3 + i];
+            positions[3 * v] = x0 + x, positions[3 * v + 1] = y0 + y, positions[3 * v + 2] = z0 + z;
+            const g = 9 * v;
+            gradients[g] = ax, gradients[g + 1] = ay, gradients[g + 2] = az;
+            gradients[g + 3] = bx, gradients[g + 4] = by, gradients[g + 5] = bz;
+            gradients[g + 6] = cx, gradients[g + 7] = cy, gradients[g + 8] = cz;
         }
         return this;
     }
@@ -128,18 +141,18 @@ export class Embedding {
 /** Of each near point: its weight in the position at `place`, and in the gradient's columns. */
 function weightsAt(points, place, near) {
     const local = near.map((k) => [0, 1, 2].map((i) => points[3 * k + i] - place[i]));
-    const scale = Math.max(...local.map((p) => Math.hypot(...p)));
+    const scale = Math.max(...local.map((p) => length(...p)));
     if (!(scale > 0)) throw new Error("The points of an embedding all lie at one place.");
     for (const p of local) for (let i = 0; i < 3; ++i) p[i] /= scale;
     const size = NEAR + POLYNOMIALS, columns = 4;
     const matrix = new Float64Array(size * size), right = new Float64Array(size * columns);
     for (let r = 0; r < NEAR; ++r) {
         for (let c = 0; c < NEAR; ++c)
-            matrix[r * size + c] = Math.hypot(local[r][0] - local[c][0], local[r][1] - local[c][1], local[r][2] - local[c][2]) ** 3;
+            matrix[r * size + c] = length(local[r][0] - local[c][0], local[r][1] - local[c][1], local[r][2] - local[c][2]) ** 3;
         polynomials(local[r]).forEach((value, t) => {
             matrix[r * size + NEAR + t] = matrix[(NEAR + t) * size + r] = value;
         });
-        const distance = Math.hypot(...local[r]);
+        const distance = length(...local[r]);
         right[r * columns] = distance ** 3;
         for (let i = 0; i < 3; ++i) right[r * columns + 1 + i] = -3 * distance * local[r][i];
     }
