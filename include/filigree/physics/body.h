@@ -119,6 +119,41 @@ struct CellReport {
 };
 
 // ---------------------------------------------------------------------------------------------------------------------
+// What varies within a body
+
+/// A quantity of the material that may vary from cell to cell.
+enum class FieldOf { stiffness, density, damping, yield_stress, strength };
+
+/// Multiples of the material's quantities: one number a cell, kLeast .. kMost; or empty: 1 everywhere. For the models
+/// fem and rigid. A field costs no time by itself, but the stiffest and lightest cell sets the step: ten times as stiff
+/// takes 3.2 times as many substeps.
+struct BodyFields {
+    static constexpr float kLeast = 1e-3f, kMost = 1e3f;
+    /// Stiffness that varies by more than this, either way, earns a warning.
+    static constexpr float kMostUsual = 10;
+
+    std::vector<float> stiffness = {};    ///< of Young's modulus; Poisson's ratio is the same everywhere
+    std::vector<float> density = {};      ///< of Material::density
+    std::vector<float> damping = {};      ///< of Material::damping; a rigid body takes the mean by mass
+    std::vector<float> yield_stress = {}; ///< of Material::yield_stress
+    /// Of FractureMaterial::strength, also in front of a crack, and of its plastic_opening. The energy stays.
+    std::vector<float> strength = {};
+
+    bool empty() const {
+        return stiffness.empty() && density.empty() && damping.empty() && yield_stress.empty() && strength.empty();
+    }
+    std::vector<float>& of(FieldOf quantity);
+    const std::vector<float>& of(FieldOf quantity) const;
+};
+
+/// A field by the vertices of the body's mesh: one multiple a vertex, BodyFields::kLeast .. kMost. It is spread inwards
+/// as spread_inwards does.
+struct VertexField {
+    FieldOf of = FieldOf::stiffness;
+    std::vector<float> values;
+};
+
+// ---------------------------------------------------------------------------------------------------------------------
 // Distance fields
 
 /// Signed distance from a mesh: values at the points of a regular grid, negative inside, trilinear in between.
@@ -181,15 +216,17 @@ struct Body {
     /// are inside this body. Null for bodies of mpm.
     std::shared_ptr<const DistanceField> field;
     float field_radius = 0; ///< m: half the thickness that counts for a sheet without thickness; else 0
+    BodyFields fields;      ///< what varies within the body; set_fields changes it
 
     double spacing() const { return cells.spacing; }
     std::size_t particle_count() const { return rest.size(); }
 };
 
 struct BodyOptions {
-    double scale = 1;                ///< metres a model unit, above 0; give this or `size`
-    std::optional<double> size = {}; ///< m, above 0: longest side of the mesh's box
-    CellOptions cells;               ///< cells.count: about how many particles
+    double scale = 1;                     ///< metres a model unit, above 0; give this or `size`
+    std::optional<double> size = {};      ///< m, above 0: longest side of the mesh's box
+    CellOptions cells;                    ///< cells.count: about how many particles
+    std::vector<VertexField> fields = {}; ///< what varies within the body; each quantity once at most
 };
 
 /// Parts of a closed mesh that are so close to each other that one cell holds both: they move as one.
@@ -211,9 +248,26 @@ struct BodyReport {
 
 /// Makes a body from a mesh: cells that cover it, particles, surface points and a distance field. Closed or open
 /// meshes. Cost O(F log F), and a distance at each point of a grid of half a spacing. Errors: usage (check_mesh or
-/// check_material refuses its input; scale or size out of range, or both given), unsuitable (no faces; more than 2^26
-/// cells: the sentence says a spacing that works), cancelled.
+/// check_material refuses its input; scale or size out of range, or both given; a field of another number of values
+/// than vertices, or what set_fields refuses), unsuitable (no faces; more than 2^26 cells: the sentence says a spacing
+/// that works), cancelled.
 Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOptions& options = {},
                        const RunContext& context = RunContext(), BodyReport* report = nullptr);
+
+/// Carries values of a surface inwards: one value a cell of the body. A cell that the surface passes through has the
+/// mean of the surface in it, by area; inside, each cell is the mean of its neighbours (harmonic), so nothing lies
+/// outside of what the surface has. mesh: the mesh that the body was made of. at_vertices: one finite number a vertex.
+/// Errors: usage (check_mesh refuses the mesh; another number of values; a value that is not finite), unsuitable (the
+/// surface meets no cell of the body), cancelled. Cost O(surface / spacing^2 + cells x cells across).
+Result<std::vector<float>> spread_inwards(const Body& body, const Mesh& mesh, std::span<const float> at_vertices,
+                                          const RunContext& context = RunContext());
+
+/// Replaces the fields of a body, and its masses by them. A simulation keeps the bodies that it was made with. Errors:
+/// usage (another number of values than cells; a value out of range; a model other than fem and rigid); the body is
+/// unchanged then. Cost O(cells).
+Status set_fields(Body& body, BodyFields fields);
+/// What the user should know of a body's fields, as a sentence: stiffness that varies so much that steps become short.
+/// "": nothing.
+std::string fields_warning(const Body& body);
 
 } // namespace filigree

@@ -6,6 +6,7 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/body/cell_shares.h"
 #include "filigree/physics/body/embedding.h"
+#include "filigree/physics/body/fields.h"
 #include "filigree/physics/body/joined_parts.h"
 #include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/body/mesh_cells.h"
@@ -107,8 +108,7 @@ std::size_t make_particles(Body& body, const RunContext& context) {
     else
         use_corners(body);
     if (body.material.model == MaterialModel::meshfree) body.corners = embed_corners(body.cells, body.rest, context);
-    body.mass.resize(body.volume.size());
-    for (std::size_t p = 0; p < body.mass.size(); ++p) body.mass[p] = float(body.material.density * body.volume[p]);
+    set_masses(body);
     return split;
 }
 
@@ -237,6 +237,7 @@ std::string warning_of(const Body& body, const BodyReport& report) {
             " cells lie in parts fewer than two cells across, which will be too soft or too stiff there; more "
             "particles make them right.");
     add(joined_sentence(report.joined, body.spacing(), body.particle_count()));
+    add(fields_warning(body));
     return warning;
 }
 
@@ -288,6 +289,7 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
     body.surface.areas = std::move(spread.areas);
     body.surface.points = embed_surface(spread.positions, body, context);
     if (Status added = add_field(body, mesh, context); !added) return added.error();
+    if (Status spread_in = add_vertex_fields(body, mesh, options.fields, context); !spread_in) return spread_in.error();
     if (context.is_cancelled()) return cancelled_error();
 
     found.surface_points = body.surface.points.size();

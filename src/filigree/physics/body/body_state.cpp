@@ -3,6 +3,7 @@
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/math.h"
 #include "filigree/physics/body/embedding.h"
+#include "filigree/physics/body/fields.h"
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -50,7 +51,9 @@ Mat3f bounded_stretch(const Mat3f& gradient) {
 }
 
 std::vector<std::uint8_t> light_particles(const Body& body) {
-    const std::vector<float>& mass = body.mass;
+    std::vector<float> mass = body.mass;
+    if (!body.fields.density.empty()) // what counts is how full the cells are
+        for (std::size_t i = 0; i < mass.size(); ++i) mass[i] = float(body.material.density) * body.volume[i];
     const double h = body.spacing(), full = body.material.density * h * h * h / 8;
     const double mean = std::accumulate(mass.begin(), mass.end(), 0.0) / double(mass.size()); // of a thin sheet: less
     const auto least = float(std::min(kLight * full, kLightBeside * mean));
@@ -97,6 +100,15 @@ void set_surface_stiffness(BodyState& state) {
     for (std::size_t s = 0; s < stiffness.size(); ++s)
         stiffness[s] = float(kSurfaceStiffness * modulus * double(body.surface.areas[s]) / body.spacing());
     const Embedding& points = state.surface;
+    if (!body.fields.stiffness.empty()) {
+        const std::vector<float> around = at_corners(body.cells, body.fields.stiffness);
+        for (std::size_t s = 0; s < points.size(); ++s) {
+            float sum = 0;
+            for (Index k = points.offsets[s]; k < points.offsets[s + 1]; ++k)
+                sum += points.weights[k] * around[points.particles[k]];
+            stiffness[s] *= std::max(sum, BodyFields::kLeast);
+        }
+    }
     const auto each_weight = [&](std::size_t point, const auto& visit) {
         for (Index k = points.offsets[point]; k < points.offsets[point + 1]; ++k)
             visit(points.particles[k], std::abs(points.weights[k]));

@@ -43,6 +43,8 @@ struct BodyState {
     std::vector<float> inverse_mass;  ///< 0: pinned
     std::vector<std::uint8_t> fixed;  ///< 1: pinned
     float rest_squared_frequency = 0; ///< ElasticReport::squared_frequency at rest
+    std::vector<float> damping;       ///< of each particle, over Material::damping; empty: 1
+    double mean_damping = 1;          ///< the same of the whole body, by mass
     bool may_sleep = true;            ///< Actor::may_sleep
     bool is_held = false;             ///< by pins, forces or wind: not left to itself
     std::optional<RigidPose> rigid;   ///< of a rigid body

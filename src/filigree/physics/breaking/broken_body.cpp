@@ -3,6 +3,7 @@
 #include "filigree/core/disjoint_sets.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/body/embedding.h"
+#include "filigree/physics/body/fields.h"
 #include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/body/surface_points.h"
 #include "filigree/physics/breaking/piece_regions.h"
@@ -227,6 +228,8 @@ private:
         }
         Body body = bare_body(std::move(cells), whole_.material);
         body.scale = whole_.scale;
+        body.fields = part_of(whole_.fields, result_.cells_of_whole[k]);
+        if (!body.fields.density.empty()) set_masses(body);
         PieceGrid::Region& region = regions_[number];
         if (region.triangles.empty()) { // between the grid's points: as deep as nothing
             body.field = whole_.field;

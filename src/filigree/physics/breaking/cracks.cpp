@@ -40,14 +40,38 @@ Cracks::Cracks(std::shared_ptr<const Fracture> fracture, std::size_t whole, std:
     for (const CrackLink& link : body().links)
         strengths_.push_back(strength_of(fracture_->material, body().number_of_piece[link.pieces[0]],
                                          body().number_of_piece[link.pieces[1]]));
+    const BodyFields& fields = body().whole->fields;
+    stiffness_there_ = at_links(fields.stiffness);
+    strength_there_ = at_links(fields.strength);
+    yield_there_ = at_links(fields.yield_stress);
+    for (std::size_t l = 0; l < strength_there_.size(); ++l) strengths_[l] *= strength_there_[l];
     find_tied();
+}
+
+/// Of each link, the mean of a field over its facets' cells, by area; empty for a field that is.
+std::vector<float> Cracks::at_links(const std::vector<float>& field) const {
+    std::vector<float> there;
+    if (field.empty()) return there;
+    for (Index l = 0; l < links_.size(); ++l) {
+        float sum = 0, area = 0;
+        for (const Index f : body().facets_of_link[l]) {
+            sum += body().facets[f].area * field[body().facets[f].cell];
+            area += body().facets[f].area;
+        }
+        there.push_back(area > 0 ? sum / area : 1);
+    }
+    return there;
 }
 
 /// What the second piece pulls the first with in a cell.
 Cracks::Stress Cracks::stress(const CrackFacet& facet, std::span<const BodyState> bodies) const {
     const Body& whole = *body().whole;
     const auto spacing = float(whole.spacing());
-    const cell_kernel::CellMaterial material = cell_kernel::cell_material(whole.material, whole.spacing());
+    cell_kernel::CellMaterial material = cell_kernel::cell_material(whole.material, whole.spacing());
+    if (const std::vector<float>& stiffness = whole.fields.stiffness; !stiffness.empty()) {
+        material.shear *= stiffness[facet.cell];
+        material.bulk *= stiffness[facet.cell];
+    }
     Stress sum{Vec3f::Zero(), Vec3f::Zero()};
     const auto add = [&](Mat3f gradient, std::span<const PlasticCell> plastic, Index cell, float share) {
         Vec3f normal = facet.normal;
@@ -95,7 +119,10 @@ float Cracks::held_part(const CrackFacet& facet) const {
 
 float Cracks::strength(Index link) const {
     if (!beside_crack_[link]) return strengths_[link];
-    return strength_at_front(strengths_[link], front_energy_, double(young_modulus_), body().whole->spacing());
+    const double stiffness = stiffness_there_.empty() ? 1 : double(stiffness_there_[link]);
+    const float scale = strength_there_.empty() ? 1 : strength_there_[link];
+    return scale * strength_at_front(strengths_[link] / scale, front_energy_, stiffness * double(young_modulus_),
+                                     body().whole->spacing());
 }
 
 /// m: how far matter may have opened there for good.
@@ -183,7 +210,8 @@ bool Cracks::open_links(std::span<const BodyState> bodies, double time, const Ru
                 area += body().facets[f].area;
             }
             const Traction found = split_traction(traction / area, normal.stableNormalized());
-            const bool tears = opened / area >= most_opened(l) && found.size >= tearing;
+            const float tears_from = yield_there_.empty() ? tearing : tearing * yield_there_[l];
+            const bool tears = opened / area >= most_opened(l) && found.size >= tears_from;
             if (tears || found.size >= strength(l)) pulls[l] = found.pull;
         }
     });

@@ -71,6 +71,7 @@ private:
     const BodyState& state(std::span<const BodyState> bodies, Index piece) const { return bodies[first_ + piece]; }
     Stress stress(const CrackFacet& facet, std::span<const BodyState> bodies) const;
     float held_part(const CrackFacet& facet) const;
+    std::vector<float> at_links(const std::vector<float>& field) const;
     float strength(Index link) const;
     float most_opened(Index link) const;
     Vec3f between(Index link, std::span<const BodyState> bodies) const;
@@ -90,9 +91,11 @@ private:
     double front_energy_; ///< J/m^2
     bool is_open_ = false;
     std::vector<LinkState> links_;
-    std::vector<double> broke_;                  ///< s, of each piece
-    std::vector<std::uint8_t> beside_crack_;     ///< of each link
-    std::vector<float> strengths_;               ///< Pa, of each link away from cracks
+    std::vector<double> broke_;              ///< s, of each piece
+    std::vector<std::uint8_t> beside_crack_; ///< of each link
+    std::vector<float> strengths_;           ///< Pa, of each link away from cracks
+    /// Of each link, the body's fields in the cells that hold it, as multiples; each empty where that does not vary.
+    std::vector<float> stiffness_there_, strength_there_, yield_there_;
     std::vector<Index> tied_, facets_of_tied_;   ///< links, and what they feel
     std::vector<Index> group_of_copy_;           ///< numbers into BrokenBody::copies
     std::vector<Index> group_offsets_, members_; ///< of the groups of two and more

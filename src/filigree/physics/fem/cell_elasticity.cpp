@@ -47,7 +47,8 @@ public:
         return parallel_sum(context, cells.cells.size(), 1024, [&](std::size_t cell) {
             std::array<Vec3d, 8> corners;
             for (int c = 0; c < 8; ++c) corners[c] = positions[cells.cell_corners[cell][c]].cast<double>();
-            return cell_energy(plan_.material, corners, cells.fraction[cell]);
+            const double energy = cell_energy(plan_.material, corners, cells.fraction[cell]);
+            return plan_.stiffness.empty() ? energy : energy * double(plan_.stiffness[cell]);
         });
     }
 

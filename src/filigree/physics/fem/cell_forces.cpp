@@ -108,6 +108,11 @@ struct Motion {
     const Vectors* velocities; ///< of internal damping
 };
 
+/// Numbers a cell: Plan's. Without Varies the last two are null.
+struct CellNumbers {
+    const float *fraction, *stiffness, *pace;
+};
+
 /// What the cells on the left of a block's first corners add to them: sums over x of the right corners' forces, for
 /// y, z and both.
 template <int N>
@@ -117,22 +122,33 @@ struct Carry {
 
 /// Forces of cells i .. i + N - 1 of a run (of which the first `count` are meant where Tail), added to corners i ..
 /// i + N - 1.
-template <int N, bool Damped, bool Tail>
+template <int N, bool Damped, bool Varies, bool Tail>
 FILIGREE_INLINE void add_forces(const Factors& f, const Motion& motion, const Cells::Run& run, Index i, Index count,
-                                const float* fraction, float* const* sums, Carry<N>& carry, Extremes<N>& extremes) {
+                                const CellNumbers& cells, float* const* sums, Carry<N>& carry, Extremes<N>& extremes) {
     using L = CellLanes<N>;
     using Float = typename L::Float;
     using Int = typename L::Int;
     CellSums<N> s;
     transform<N>(motion.positions, run.rows, i, s);
-    const Float share = L::load(fraction + run.first_cell + i);
-    CellLoad<N> load(f, s, share);
-    Float stiffness = load.stiffness(f), seconds = {};
+    const Float filled = L::load(cells.fraction + run.first_cell + i);
+    CellLoad<N> load(f, s, filled);
+    Float share = filled, pace = {};
+    if constexpr (Varies) {
+        share = filled * L::load(cells.stiffness + run.first_cell + i);
+        pace = L::load(cells.pace + run.first_cell + i);
+    }
+    const auto stiffness_of = [&](const CellLoad<N>& of) __attribute__((always_inline)) {
+        if constexpr (Varies)
+            return pace * of.stiffness(f);
+        else
+            return of.stiffness(f);
+    };
+    Float stiffness = stiffness_of(load), seconds = {};
     const Float J = load.shape.J, I_now = load.I;
     if constexpr (Damped) {
         seconds = look_ahead<N>(f, load, stiffness, *motion.velocities, run, i, s);
-        load = CellLoad<N>(f, s, share);
-        stiffness = L::most(stiffness, load.stiffness(f));
+        load = CellLoad<N>(f, s, filled);
+        stiffness = L::most(stiffness, stiffness_of(load));
     }
     const CellShape<N>& shape = load.shape;
 
@@ -201,11 +217,11 @@ FILIGREE_INLINE void add_last_corner(const Cells::Run& run, float* const* sums, 
 }
 
 /// Forces of a run's cells from i on, in blocks of N and then of as few as the rest needs.
-template <int N, bool Damped>
+template <int N, bool Damped, bool Varies>
 FILIGREE_INLINE void add_run(const Factors& f, const Motion& motion, const Cells::Run& run, Index i,
-                             const float* fraction, float* const* sums, Carry<N>& carry, Extremes<N>& extremes) {
+                             const CellNumbers& cells, float* const* sums, Carry<N>& carry, Extremes<N>& extremes) {
     for (; i + N <= run.count; i += N)
-        add_forces<N, Damped, false>(f, motion, run, i, N, fraction, sums, carry, extremes);
+        add_forces<N, Damped, Varies, false>(f, motion, run, i, N, cells, sums, carry, extremes);
     const Index rest = run.count - i;
     if (rest == 0) return add_last_corner<N>(run, sums, carry);
     if constexpr (N > 4)
@@ -216,14 +232,14 @@ FILIGREE_INLINE void add_run(const Factors& f, const Motion& motion, const Cells
                 half_carry.right[u] = {L::last_half(carry.right[u].x), L::last_half(carry.right[u].y),
                                        L::last_half(carry.right[u].z)};
             Extremes<N / 2> half;
-            add_run<N / 2, Damped>(f, motion, run, i, fraction, sums, half_carry, half);
+            add_run<N / 2, Damped, Varies>(f, motion, run, i, cells, sums, half_carry, half);
             extremes.rate = L::most(extremes.rate, L::twice(half.rate));
             extremes.damping = L::most(extremes.damping, L::twice(half.damping));
             extremes.I = L::most(extremes.I, L::twice(half.I));
             extremes.J = L::least(extremes.J, L::twice(half.J));
             return;
         }
-    add_forces<N, Damped, true>(f, motion, run, i, rest, fraction, sums, carry, extremes);
+    add_forces<N, Damped, Varies, true>(f, motion, run, i, rest, cells, sums, carry, extremes);
 }
 
 struct ForceJob {
@@ -234,10 +250,11 @@ struct ForceJob {
     std::span<ElasticReport> reports; ///< one a slab
 };
 
-template <int N, bool Damped>
+template <int N, bool Damped, bool Varies>
 FILIGREE_INLINE void add_slabs(const ForceJob& job, std::size_t begin, std::size_t end) {
     const Plan& plan = job.plan;
     const Factors& factors = job.factors;
+    const CellNumbers cells{plan.fraction.data(), plan.stiffness.data(), plan.pace.data()};
     for (std::size_t index = begin; index < end; ++index) {
         const Slab& slab = plan.slabs[index];
         Vectors& to = job.sums.of_parity[index % 2];
@@ -256,7 +273,7 @@ FILIGREE_INLINE void add_slabs(const ForceJob& job, std::size_t begin, std::size
                                     to.y.data() + shift + kPadding,
                                     to.z.data() + shift + kPadding};
             Carry<N> carry = {};
-            add_run<N, Damped>(factors, job.motion, run, 0, plan.fraction.data(), sums, carry, extremes);
+            add_run<N, Damped, Varies>(factors, job.motion, run, 0, cells, sums, carry, extremes);
         }
         ElasticReport& report = job.reports[index];
         float rate = 0, damping = 0, J = extremes.J[0], I = 0;
@@ -276,28 +293,33 @@ FILIGREE_INLINE void add_slabs(const ForceJob& job, std::size_t begin, std::size
 using ForceFunction = void (*)(const ForceJob&, std::size_t, std::size_t);
 
 #if defined(FILIGREE_HAS_WIDTHS)
-template <bool Damped>
+template <bool Damped, bool Varies>
 FILIGREE_AVX512 void add_slabs_avx512(const ForceJob& job, std::size_t begin, std::size_t end) {
-    add_slabs<16, Damped>(job, begin, end);
+    add_slabs<16, Damped, Varies>(job, begin, end);
 }
-template <bool Damped>
+template <bool Damped, bool Varies>
 FILIGREE_AVX2 void add_slabs_avx2(const ForceJob& job, std::size_t begin, std::size_t end) {
-    add_slabs<8, Damped>(job, begin, end);
+    add_slabs<8, Damped, Varies>(job, begin, end);
 }
 #endif
-template <bool Damped>
+template <bool Damped, bool Varies>
 void add_slabs_plain(const ForceJob& job, std::size_t begin, std::size_t end) {
-    add_slabs<4, Damped>(job, begin, end);
+    add_slabs<4, Damped, Varies>(job, begin, end);
 }
 
-template <bool Damped>
+template <bool Damped, bool Varies>
 ForceFunction force_function(int lanes) {
 #if defined(FILIGREE_HAS_WIDTHS)
-    if (lanes == 16) return add_slabs_avx512<Damped>;
-    if (lanes == 8) return add_slabs_avx2<Damped>;
+    if (lanes == 16) return add_slabs_avx512<Damped, Varies>;
+    if (lanes == 8) return add_slabs_avx2<Damped, Varies>;
 #endif
     assert(lanes == 4);
-    return add_slabs_plain<Damped>;
+    return add_slabs_plain<Damped, Varies>;
+}
+
+ForceFunction force_function(int lanes, bool is_damped, bool varies) {
+    if (varies) return is_damped ? force_function<true, true>(lanes) : force_function<false, true>(lanes);
+    return is_damped ? force_function<true, false>(lanes) : force_function<false, false>(lanes);
 }
 
 Factors factors_of(const Plan& plan, const InternalDamping* damping) {
@@ -353,7 +375,7 @@ ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces
     std::vector<ElasticReport> reports(plan.slabs.size());
     const Motion motion{positions, damping ? &damping->velocities : nullptr};
     const ForceJob job{plan, motion, factors_of(plan, damping), sums, reports};
-    const ForceFunction add_slabs_of = damping ? force_function<true>(lanes) : force_function<false>(lanes);
+    const ForceFunction add_slabs_of = force_function(lanes, damping != nullptr, !plan.stiffness.empty());
     parallel_for(context, plan.slabs.size(), 1,
                  [&](std::size_t begin, std::size_t end) { add_slabs_of(job, begin, end); });
 

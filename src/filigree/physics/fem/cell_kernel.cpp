@@ -56,6 +56,17 @@ Plan make_plan(const Body& body) {
     plan.material = cell_material(body.material, body.cells.spacing);
     plan.fraction = body.cells.fraction;
     plan.fraction.resize(plan.fraction.size() + kPadding);
+    if (const BodyFields& fields = body.fields; !fields.stiffness.empty() || !fields.density.empty()) {
+        const std::size_t count = body.cells.cells.size();
+        plan.stiffness.assign(count, 1);
+        if (!fields.stiffness.empty()) plan.stiffness = fields.stiffness;
+        plan.pace = plan.stiffness;
+        // A corner's mass is the sum of what its cells give it, so no cell swings faster than by itself.
+        if (!fields.density.empty())
+            for (std::size_t c = 0; c < count; ++c) plan.pace[c] /= fields.density[c];
+        plan.stiffness.resize(count + kPadding);
+        plan.pace.resize(count + kPadding);
+    }
     plan_slabs(plan);
     return plan;
 }

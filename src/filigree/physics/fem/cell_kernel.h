@@ -74,7 +74,10 @@ struct Slab {
 struct Plan {
     const Cells* cells = nullptr;
     CellMaterial material;
-    std::vector<float> fraction;           ///< padded with zeros
+    std::vector<float> fraction; ///< padded with zeros
+    /// Of a body whose stiffness or density varies, padded with zeros; else empty: stiffness of each cell, and of it
+    /// over density, as multiples of the material's.
+    std::vector<float> stiffness, pace;
     std::vector<std::size_t> layer_starts; ///< first corner of each layer; one more at the end
     std::vector<std::size_t> run_layers;   ///< of each run's lower corners
     std::vector<Slab> slabs;

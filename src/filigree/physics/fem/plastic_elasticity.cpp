@@ -123,9 +123,14 @@ public:
 
     void finish_substep(const Vectors& positions, float dt, const RunContext& context) override {
         const FlowLaw law = yield_law(body_.material, dt);
+        const std::vector<float>& stress = body_.fields.yield_stress;
         parallel_for(context, plastic_.size(), kPlasticGrain, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t cell = begin; cell < end; ++cell)
-                yield(plastic_[cell], cell_sums(positions, body_.cells.cell_corners[cell]), size_, law);
+            for (std::size_t cell = begin; cell < end; ++cell) {
+                FlowLaw own = law;
+                if (!stress.empty()) own.yield_strain *= stress[cell];
+                if (!body_.fields.stiffness.empty()) own.yield_strain /= body_.fields.stiffness[cell];
+                yield(plastic_[cell], cell_sums(positions, body_.cells.cell_corners[cell]), size_, own);
+            }
         });
     }
 
@@ -172,7 +177,9 @@ private:
         const ElasticShape shape = shape_of(cell, positions);
         const PlasticCell& plastic = plastic_[cell];
         const float I = shape.linear + shape.bent, h = material_.spacing;
-        const float volume = body_.cells.fraction[cell] * h * h * h;
+        const BodyFields& fields = body_.fields;
+        const float stiffness = fields.stiffness.empty() ? 1 : fields.stiffness[cell];
+        const float volume = body_.cells.fraction[cell] * stiffness * h * h * h;
         const float hard = cell_kernel::crush_stiffness(material_, body_.cells.fraction[cell]);
         const float by_sums = volume * material_.shear * I / (I + 1) / (size_ * size_);
         const float by_volume =
@@ -199,7 +206,8 @@ private:
                     P[i | bit] = even + odd;
                 }
         for (int corner = 0; corner < 8; ++corner) pushes_[cell][corner] = -P[corner];
-        const float rate = 1.0001f * 4 * material_.bulk / (material_.density * h * h);
+        const float density = material_.density * (fields.density.empty() ? 1 : fields.density[cell]);
+        const float rate = 1.0001f * 4 * stiffness * material_.bulk / (density * h * h);
         const float frequency = rate * stiffness_of(material_, plastic, shape, size_, hard);
         take_worse(report, {frequency <= 3e38f ? frequency : std::numeric_limits<float>::infinity(), shape.J,
                             std::sqrt(I / 3)});
@@ -215,7 +223,8 @@ private:
         for (int m = 1; m < 8; ++m) I += square(m);
         for (const int m : kBentSums) bent += square(m);
         const double J = X[1].cast<double>().dot(X[2].cast<double>().cross(X[4].cast<double>())) / (size * size * size);
-        return double(body_.cells.fraction[cell]) * h * h * h *
+        const std::vector<float>& stiffness = body_.fields.stiffness;
+        return (stiffness.empty() ? 1.0 : double(stiffness[cell])) * double(body_.cells.fraction[cell]) * h * h * h *
                (double(material_.shear) *
                     (0.5 * ((I - 3) - math::log1p((I - 3) / 4)) + cell_kernel::bent_energy(bent)) +
                 double(material_.bulk) * (0.5 * (J - 1) * (J + 1 - 2 * g) +

@@ -1,6 +1,7 @@
 #include "filigree/physics/step/begin_bodies.h"
 
 #include "filigree/core/text.h"
+#include "filigree/physics/body/fields.h"
 #include "filigree/physics/rigid/rigid_body.h"
 #include "filigree/physics/rigid/rigid_state.h"
 #include "filigree/physics/step/stiff_hits.h"
@@ -41,6 +42,10 @@ BodyState begin_body(const Actor& actor, std::size_t number, const RunContext& c
     state.fixed.assign(count, 0);
     state.inverse_mass.resize(count);
     for (std::size_t i = 0; i < count; ++i) state.inverse_mass[i] = 1 / body.mass[i];
+    if (!body.fields.damping.empty()) {
+        state.damping = at_corners(body.cells, body.fields.damping);
+        state.mean_damping = mean_at(state.damping, body.mass);
+    }
 
     if (body.material.model == MaterialModel::rigid) {
         fit_pose(state);

@@ -242,7 +242,8 @@ private:
         const Vec3d& gravity = state_.world.gravity;
         rigid_contacts_.prepare(bodies_, gravity, context_);
         each_awake_rigid([&](BodyState& body, std::size_t b) {
-            kick_rigid(body, rigid_loads_[b], Vec3d::Zero(), 0.5 * dt, math::exp(-dt * body.body->material.damping));
+            kick_rigid(body, rigid_loads_[b], Vec3d::Zero(), 0.5 * dt,
+                       math::exp(-dt * body.mean_damping * body.body->material.damping));
             kick_rigid(body, {}, gravity, dt, 1); // undamped: what lies has its whole weight
         });
         rigid_contacts_.solve(bodies_, dt, context_);
@@ -482,8 +483,20 @@ private:
                 kick_axis(body.velocities.x, body.forces.x, gravity.x());
                 kick_axis(body.velocities.y, body.forces.y, gravity.y());
                 kick_axis(body.velocities.z, body.forces.z, gravity.z());
+                if (damp && !body.damping.empty()) damp_beside(body, dt, begin, end);
             });
         });
+    }
+
+    /// What the damping of particles [begin, end) differs by from the material's.
+    static void damp_beside(BodyState& body, float dt, std::size_t begin, std::size_t end) {
+        const double rate = -2 * double(dt) * body.body->material.damping;
+        for (std::size_t i = begin; i < end; ++i) {
+            const auto left = float(math::exp(rate * double(body.damping[i] - 1)));
+            body.velocities.x[i] *= left;
+            body.velocities.y[i] *= left;
+            body.velocities.z[i] *= left;
+        }
     }
 
     void drift(float dt) {

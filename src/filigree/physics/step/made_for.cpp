@@ -1,5 +1,6 @@
 #include "filigree/physics/step/made_for.h"
 
+#include "filigree/physics/body/fields.h"
 #include "filigree/physics/step/byte_stream.h"
 
 #define XXH_INLINE_ALL
@@ -76,6 +77,11 @@ void write(ByteWriter& out, const Body& body) {
     out.array(std::span(body.mass));
     out.array(std::span(body.cells.cells));
     out.array(std::span(body.surface.points.rest));
+    for (const FieldOf of : kFields) // of a body in which nothing varies the hash is what it would be without fields
+        if (const std::vector<float>& field = body.fields.of(of); !field.empty()) {
+            out.value(std::uint64_t(of));
+            out.array(std::span(field));
+        }
 }
 
 void write(ByteWriter& out, const Fracture& fracture) {
