@@ -74,7 +74,8 @@ struct Embedding {
 
 /// The cubes of a regular lattice that a mesh occupies. Cell (i, j, k) reaches from origin + spacing (i, j, k) to
 /// origin + spacing (i + 1, j + 1, k + 1). Cells and corners ascend by k, then j, then i: neighbours along x are
-/// neighbours in memory.
+/// neighbours in memory. Where parts are kept apart (BodyOptions::separate), a point of the lattice has a corner for
+/// each part around it, one after the other, and `runs` is empty.
 struct Cells {
     using LatticeIndex = std::array<std::uint16_t, 3>;
 
@@ -99,8 +100,26 @@ struct Cells {
     };
     std::vector<Run> runs; ///< ascending by cell
 
+    static constexpr int kHomesAlong = 4;
+    /// Of a body whose parts are kept apart: some of the 4^3 cubes of a place of the lattice (bits x + 4 y + 16 z) hold
+    /// another part than the cell there, or there is no cell; points in them go with `cell`.
+    struct Home {
+        LatticeIndex at;
+        std::uint64_t cubes;
+        Index cell;
+    };
+    std::vector<Home> homes; ///< ascending by place
+    /// Whether parts are kept apart in it.
+    bool is_parted() const { return runs.empty() && !cells.empty(); }
+
     /// Cell with these indices, kNoIndex where there is none. Cost O(log cells).
     Index find_cell(int i, int j, int k) const;
+    /// The cell that a point goes with, kNoIndex where there is none. at: in spacings, from the origin. Cost as
+    /// find_cell.
+    Index find_cell(const Vec3d& at) const;
+    /// Whether neighbouring cells hang together: they share a corner. True of all neighbours unless parts are kept
+    /// apart.
+    bool are_joined(Index cell, Index neighbour) const;
 };
 
 struct CellOptions {
@@ -227,9 +246,13 @@ struct BodyOptions {
     std::optional<double> size = {};      ///< m, above 0: longest side of the mesh's box
     CellOptions cells;                    ///< cells.count: about how many particles
     std::vector<VertexField> fields = {}; ///< what varies within the body; each quantity once at most
+    /// Whether parts of a closed mesh that are nearer to each other than two particles move apart, from gaps of a
+    /// quarter of a cell on. Of the model fem; such a body does not break.
+    bool separate = false;
 };
 
-/// Parts of a closed mesh that are so close to each other that one cell holds both: they move as one.
+/// Parts of a closed mesh that are so close to each other that one cell holds both: they move as one, unless
+/// BodyOptions::separate keeps them apart.
 struct JoinedParts {
     std::size_t corners = 0;     ///< corners of such cells; 0: none, or too few to matter
     Vec3f place = Vec3f::Zero(); ///< m, on the body at rest: where the gap is narrowest
@@ -240,10 +263,11 @@ struct BodyReport {
     CellReport cells;
     std::size_t split_cells = 0; ///< meshfree: cells with eight particles
     std::size_t surface_points = 0;
-    double mass = 0;       ///< kg
-    OutwardReport outward; ///< what was turned to make faces look outwards
-    JoinedParts joined;    ///< fem, springs, meshfree
-    std::string warning;   ///< sentences for the user: thin, joined or turned parts; or ""
+    double mass = 0;                   ///< kg
+    OutwardReport outward;             ///< what was turned to make faces look outwards
+    JoinedParts joined;                ///< fem, springs, meshfree; of separate parts those that are joined still
+    std::size_t separated_corners = 0; ///< BodyOptions::separate: copies of corners that keep parts apart
+    std::string warning;               ///< sentences for the user: thin, joined or turned parts; or ""
 };
 
 /// Makes a body from a mesh: cells that cover it, particles, surface points and a distance field. Closed or open

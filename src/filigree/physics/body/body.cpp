@@ -11,6 +11,7 @@
 #include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/body/mesh_cells.h"
 #include "filigree/physics/body/occupied_cells.h"
+#include "filigree/physics/body/separate_parts.h"
 #include "filigree/physics/body/surface_points.h"
 #include "filigree/physics/simulation.h"
 
@@ -207,7 +208,8 @@ double field_spacing(const Body& body) {
     Box box;
     for (const auto& corner : body.cells.corners) box.extend(Vec3d(corner[0], corner[1], corner[2]));
     const double points = (box.size().array() / kFieldSpacing + 1).prod();
-    return kFieldSpacing * body.spacing() * std::max(1.0, math::cbrt(points / kMostFieldPoints));
+    const double finer = body.cells.is_parted() ? 0.5 : 1; // so that it sees gaps of a quarter of a cell
+    return finer * kFieldSpacing * body.spacing() * std::max(1.0, math::cbrt(points / kMostFieldPoints));
 }
 
 /// The distance from the surface at rest. A mesh whose inside is thinner than cells can see counts as a sheet.
@@ -237,6 +239,8 @@ std::string warning_of(const Body& body, const BodyReport& report) {
             " cells lie in parts fewer than two cells across, which will be too soft or too stiff there; more "
             "particles make them right.");
     add(joined_sentence(report.joined, body.spacing(), body.particle_count()));
+    if (report.joined.corners > 0 && body.material.model == MaterialModel::fem && !body.cells.is_parted())
+        add("The option separate keeps them apart too.");
     add(fields_warning(body));
     return warning;
 }
@@ -252,6 +256,18 @@ Result<double> scale_of(const Mesh& mesh, const BodyOptions& options) {
     if (!(longest > 0))
         return Error{ErrorCode::unsuitable, "The mesh has no extent, so there is nothing to give a size to."};
     return *options.size / longest;
+}
+
+/// Takes apart what cells join.
+Status keep_apart(const Mesh& mesh, const WeldedTriangles& welded, Body& body, BodyReport& report,
+                  const RunContext& context) {
+    if (report.joined.corners == 0) return Success{};
+    const Result<JoinedParts> left = separate_parts(mesh.positions, welded, body.scale, body.cells, context);
+    if (!left) return left.error();
+    report.joined = *left;
+    const std::vector<Cells::LatticeIndex>& corners = body.cells.corners;
+    for (std::size_t c = 1; c < corners.size(); ++c) report.separated_corners += corners[c] == corners[c - 1];
+    return Success{};
 }
 
 bool joins_by_cells(MaterialModel model) { return model != MaterialModel::rigid && model != MaterialModel::mpm; }
@@ -280,6 +296,11 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
         const Result<JoinedParts> joined = find_joined_parts(mesh.positions, *welded, *scale, body.cells, context);
         if (!joined) return joined.error();
         found.joined = *joined;
+    }
+    if (options.separate) {
+        if (material.model != MaterialModel::fem)
+            return Error{ErrorCode::usage, "Only bodies of the model fem keep near parts apart (separate)."};
+        if (Status apart = keep_apart(mesh, *welded, body, found, context); !apart) return apart.error();
     }
     if (!uses_centroids(material.model)) share_with_neighbours(body.cells);
     found.split_cells = make_particles(body, context);

@@ -34,7 +34,17 @@ void find_shares(const Cells& cells, std::size_t c, int most, std::vector<CellSh
     const Vec3d off = (cells.centroid[c].cast<double>() - centre) / cells.spacing;
     const auto cell_at = [&](int i, int j, int k) {
         const auto way = [&](int axis) { return off[axis] < 0 ? -1 : 1; };
-        return cells.find_cell(index[0] + i * way(0), index[1] + j * way(1), index[2] + k * way(2));
+        const std::array<int, 3> to = {index[0] + i * way(0), index[1] + j * way(1), index[2] + k * way(2)};
+        if (!cells.is_parted()) return cells.find_cell(to[0], to[1], to[2]);
+        std::array<int, 3> at = {index[0], index[1], index[2]}; // step by step, through what hangs together
+        Index last = Index(c);
+        for (int axis = 0; axis < 3; ++axis)
+            while (at[axis] != to[axis] && last != kNoIndex) {
+                at[axis] += way(axis);
+                const Index next = cells.find_cell(at[0], at[1], at[2]);
+                last = next != kNoIndex && cells.are_joined(last, next) ? next : kNoIndex;
+            }
+        return last;
     };
     std::array<AxisShares, 3> along;
     for (int axis = 0; axis < 3; ++axis) {

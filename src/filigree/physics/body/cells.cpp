@@ -110,8 +110,55 @@ Index Cells::find_cell(int i, int j, int k) const {
     return found != cells.end() && *found == index ? Index(found - cells.begin()) : kNoIndex;
 }
 
+Index Cells::find_cell(const Vec3d& at) const {
+    const Vec3d low = at.array().floor();
+    if (!((low.array() >= 0).all() && (low.array() <= 65535).all())) return kNoIndex;
+    if (!homes.empty()) {
+        const LatticeIndex index = {std::uint16_t(low[0]), std::uint16_t(low[1]), std::uint16_t(low[2])};
+        const Vec3d cube = (kHomesAlong * (at - low)).array().floor().min(kHomesAlong - 1.0);
+        const unsigned bit = unsigned(cube[0] + kHomesAlong * (cube[1] + kHomesAlong * cube[2]));
+        for (auto home = std::ranges::lower_bound(homes, index, comes_before, &Home::at);
+             home != homes.end() && home->at == index; ++home)
+            if (home->cubes >> bit & 1) return home->cell;
+    }
+    return find_cell(int(low[0]), int(low[1]), int(low[2]));
+}
+
+bool Cells::are_joined(Index cell, Index neighbour) const {
+    if (!is_parted()) return true;
+    for (const Index corner : cell_corners[cell])
+        if (std::ranges::find(cell_corners[neighbour], corner) != cell_corners[neighbour].end()) return true;
+    return false;
+}
+
+namespace {
+
+/// corner_gradients where corners have copies.
+void gradients_by_cells(const Cells& cells, const Vectors& positions, std::span<Mat3f> gradients) {
+    std::ranges::fill(gradients, Mat3f::Zero());
+    std::vector<float> weights(gradients.size(), 0.0f);
+    const float scale = float(0.25 / cells.spacing);
+    for (Index c = 0; c < cells.cells.size(); ++c) {
+        Mat3f gradient = Mat3f::Zero();
+        for (int corner = 0; corner < 8; ++corner)
+            for (int axis = 0; axis < 3; ++axis) {
+                const Vec3f p = positions[cells.cell_corners[c][corner]];
+                gradient.col(axis) += corner >> axis & 1 ? p : Vec3f(-p);
+            }
+        gradient *= cells.fraction[c] * scale;
+        for (const Index corner : cells.cell_corners[c]) {
+            gradients[corner] += gradient;
+            weights[corner] += cells.fraction[c];
+        }
+    }
+    for (std::size_t corner = 0; corner < gradients.size(); ++corner) gradients[corner] *= 1 / weights[corner];
+}
+
+} // namespace
+
 void corner_gradients(const Cells& cells, const Vectors& positions, std::span<Mat3f> gradients,
                       const RunContext& context) {
+    if (cells.is_parted()) return gradients_by_cells(cells, positions, gradients);
     // Layers of cells by their k: those of even k share no corner, so they can go at the same time; then those of odd
     // k. So each corner adds up its cells in the same order whatever the number of threads.
     std::vector<std::array<std::size_t, 2>> layers[2];

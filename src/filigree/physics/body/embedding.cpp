@@ -14,6 +14,9 @@ namespace filigree {
 
 namespace {
 
+/// Cells from the middle of its own that a point may be, where parts are kept apart.
+constexpr double kOfPart = 1.5;
+
 constexpr std::size_t kEmbeddingGrain = 2048; // points in a piece of parallel work
 constexpr double kRadius = 1.75;       // spacings; smaller is sharper, and 1.75 always holds a cell's eight corners
 constexpr double kRadiusGrowth = 1.25; // where the particles in it do not do
@@ -108,6 +111,7 @@ public:
     /// Leaves the corners of the point's own cell and of the 26 around it; everything where it is in no cell.
     void keep(const Vec3d& point, std::vector<ParticleGrid::Near>& near) const {
         if (!cells_) return;
+        if (cells_->is_parted()) return keep_joined(point, near);
         const Vec3d at = ((point - cells_->origin) / cells_->spacing).array().floor();
         if ((at.array() < 0).any() || (at.array() > 65535).any()) return;
         const std::array<int, 3> low = {int(at[0]) - 1, int(at[1]) - 1, int(at[2]) - 1};
@@ -126,6 +130,23 @@ public:
     }
 
 private:
+    /// The same where a lattice point has several corners.
+    void keep_joined(const Vec3d& point, std::vector<ParticleGrid::Near>& near) const {
+        const Vec3d place = (point - cells_->origin) / cells_->spacing;
+        const Index own = nearest_cell(*cells_, place);
+        const Cells::LatticeIndex& low = cells_->cells[own];
+        if (((place - Vec3d(low[0], low[1], low[2])).array() - 0.5).abs().maxCoeff() > kOfPart) return;
+        std::vector<Index> reached;
+        for (int n = 0; n < 27; ++n) {
+            const Index cell = cells_->find_cell(low[0] + n % 3 - 1, low[1] + n / 3 % 3 - 1, low[2] + n / 9 - 1);
+            if (cell != kNoIndex && cells_->are_joined(own, cell))
+                reached.insert(reached.end(), cells_->cell_corners[cell].begin(), cells_->cell_corners[cell].end());
+        }
+        std::erase_if(near, [&](const ParticleGrid::Near& particle) {
+            return std::ranges::find(reached, Index(particle.particle)) == reached.end();
+        });
+    }
+
     static std::size_t number(int i, int j, int k) { return std::size_t(i + 4 * j + 16 * k); }
 
     const Cells* cells_;
@@ -360,15 +381,9 @@ Embedding embed_corners(const Cells& cells, const Vectors& rest, const RunContex
                         context, nullptr);
 }
 
-namespace {
-
-/// The cell that holds a point given in spacings from the lattice's origin, else the nearest.
 Index nearest_cell(const Cells& cells, const Vec3d& at) {
+    if (const Index cell = cells.find_cell(at); cell != kNoIndex) return cell;
     const Vec3d low = at.array().floor();
-    if ((low.array() >= -1).all() && (low.array() <= 65535).all()) {
-        const std::array<int, 3> index = {int(low[0]), int(low[1]), int(low[2])};
-        if (const Index cell = cells.find_cell(index[0], index[1], index[2]); cell != kNoIndex) return cell;
-    }
     const auto outside = [](double x, double begin, double end) { return std::max({begin - x, x - end, 0.0}); };
     double least = std::numeric_limits<double>::infinity();
     Index nearest = 0;
@@ -383,10 +398,22 @@ Index nearest_cell(const Cells& cells, const Vec3d& at) {
         least = distance;
         nearest = run.first_cell + Index(std::clamp(low[0] - first[0], 0.0, run.count - 1.0));
     }
-    return nearest;
+    if (!cells.is_parted()) return nearest;
+    for (Index c = 0; c < cells.cells.size(); ++c) {
+        double distance = 0;
+        for (int axis = 0; axis < 3; ++axis) {
+            const double away = outside(at[axis], cells.cells[c][axis], cells.cells[c][axis] + 1.0);
+            distance += away * away;
+        }
+        if (distance >= least) continue;
+        least = distance;
+        nearest = c;
+    }
+    const Vec3d corner(cells.cells[nearest][0], cells.cells[nearest][1], cells.cells[nearest][2]);
+    const Vec3d inside = at.cwiseMax(corner).cwiseMin(corner + Vec3d::Constant(1 - 1e-6));
+    const Index there = cells.find_cell(inside);
+    return there == kNoIndex ? nearest : there;
 }
-
-} // namespace
 
 Embedding embed_in_cells(std::span<const Vec3f> points, const Cells& cells, const RunContext& context) {
     Embedding embedding;

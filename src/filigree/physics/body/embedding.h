@@ -23,6 +23,9 @@ Embedding embed(std::span<const Vec3f> points, const Vectors& rest, double spaci
 Embedding embed_to_follow(std::span<const Vec3f> points, const Vectors& rest, double spacing, const Cells* cells,
                           const RunContext& context);
 
+/// The cell that a point goes with (Cells::find_cell), else the nearest. at: in spacings, from the cells' origin.
+Index nearest_cell(const Cells& cells, const Vec3d& at);
+
 /// Trilinear weights in the cell that holds each point (or the nearest cell): positive inside, eight a point. For the
 /// corners of cells.
 Embedding embed_in_cells(std::span<const Vec3f> points, const Cells& cells, const RunContext& context);

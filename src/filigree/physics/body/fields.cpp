@@ -52,8 +52,8 @@ SurfaceMeans surface_means(const Body& body, const Mesh& mesh, std::span<const T
         const double longest = std::max({(p[1] - p[0]).norm(), (p[2] - p[1]).norm(), (p[0] - p[2]).norm()});
         each_part(unsigned(std::clamp(std::ceil(longest / kFieldSampling), 1.0, kMostAlongEdge)),
                   [&](const Vec3d& weights, double share) {
-                      const Vec3d at = (weights[0] * p[0] + weights[1] * p[1] + weights[2] * p[2]).array().floor();
-                      const Index cell = cells.find_cell(int(at[0]), int(at[1]), int(at[2]));
+                      const Index cell =
+                          cells.find_cell(Vec3d(weights[0] * p[0] + weights[1] * p[1] + weights[2] * p[2]));
                       if (cell == kNoIndex) return;
                       double value = 0;
                       for (int k = 0; k < 3; ++k) value += weights[k] * double(at_vertices[triangle[k]]);
@@ -72,7 +72,8 @@ std::vector<std::array<Index, 6>> cells_beside(const Cells& cells, const RunCont
             for (int side = 0; side < 6; ++side) {
                 std::array<int, 3> at = {cells.cells[c][0], cells.cells[c][1], cells.cells[c][2]};
                 at[side / 2] += side % 2 ? 1 : -1;
-                beside[c][side] = cells.find_cell(at[0], at[1], at[2]);
+                const Index cell = cells.find_cell(at[0], at[1], at[2]);
+                beside[c][side] = cell != kNoIndex && cells.are_joined(Index(c), cell) ? cell : kNoIndex;
             }
     });
     return beside;

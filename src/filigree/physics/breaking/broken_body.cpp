@@ -449,6 +449,9 @@ Result<std::shared_ptr<const BrokenBody>> break_body(std::shared_ptr<const Body>
     if (whole->material.model != MaterialModel::fem)
         return Error{ErrorCode::unsuitable,
                      "Only bodies of the model fem break; it yields before that where it has a yield stress."};
+    if (whole->cells.is_parted())
+        return Error{ErrorCode::unsuitable, "A body whose near parts are kept apart (separate) does not break; make it "
+                                            "without."};
     Result<BrokenBody> broken = BodyBreaker(std::move(whole), std::move(partition), context).run();
     if (!broken) return broken.error();
     const auto kept = std::make_shared<const BrokenBody>(std::move(*broken));

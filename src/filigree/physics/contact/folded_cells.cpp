@@ -2,6 +2,7 @@
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/physics/contact/cell_normals.h"
+#include "filigree/physics/fem/plastic_cells.h"
 
 #include <algorithm>
 
@@ -32,7 +33,7 @@ FoldedCells::FoldedCells(const Matter& matter) : matter_(matter) {
             std::array<int, 3> at = {cells.cells[one][0], cells.cells[one][1], cells.cells[one][2]};
             ++at[std::size_t(axis)];
             const Index other = matter.cell_at(at[0], at[1], at[2]);
-            if (other == kNoIndex) continue;
+            if (other == kNoIndex || !cells.are_joined(one, other)) continue;
             const Vec3f normal = rest_normals_[one], other_normal = rest_normals_[other];
             if (normal.isZero(0) || other_normal.isZero(0)) continue;
             if (Matter::are_sides_of_thin_part(normal, other_normal, Vec3f::Unit(axis))) continue; // they do not meet
@@ -41,9 +42,20 @@ FoldedCells::FoldedCells(const Matter& matter) : matter_(matter) {
         }
 }
 
+/// As turn_cell_normals, where corners have copies.
+void FoldedCells::turn_by_cells(const Vectors& positions, Vectors& normals) const {
+    for (Index cell = 0; cell < normals.size(); ++cell) {
+        const CellSums X = cell_sums(positions, matter_.corners(cell));
+        const Vec3f rest = rest_normals_[cell];
+        const Vec3f area = rest.x() * X[2].cross(X[4]) + rest.y() * X[4].cross(X[1]) + rest.z() * X[1].cross(X[2]);
+        normals.set(cell, area.norm() > 0 ? area.normalized() : Vec3f::Zero());
+    }
+}
+
 std::vector<Index> FoldedCells::find(const Vectors& positions, const RunContext& context) const {
     const std::span<const Cells::Run> runs = matter_.body().cells.runs;
     Vectors normals(rest_normals_.size());
+    if (matter_.body().cells.is_parted()) turn_by_cells(positions, normals);
     parallel_for(context, runs.size(), kRunsGrain, [&](std::size_t begin, std::size_t end) {
         turn_cell_normals(runs.subspan(begin, end - begin), positions, rest_normals_, normals);
     });

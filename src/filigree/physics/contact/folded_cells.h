@@ -20,6 +20,8 @@ private:
         float fold_cosine; ///< between their normals: below it the surface may touch itself
     };
 
+    void turn_by_cells(const Vectors& positions, Vectors& normals) const;
+
     const Matter& matter_;
     Vectors rest_normals_; ///< of each cell: the mean of its points' normals, unit; zero where it has none
     std::vector<Neighbours> neighbours_;

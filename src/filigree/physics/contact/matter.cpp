@@ -1,5 +1,7 @@
 #include "filigree/physics/contact/matter.h"
 
+#include "filigree/physics/body/embedding.h"
+
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -83,6 +85,7 @@ void Matter::find_together() {
             exists[n] = cell_at(at[0] + n % 5 - 2, at[1] + n / 5 % 5 - 2, at[2] + n / 25 - 2) != kNoIndex;
         const auto spread = [&](int n) { // to all neighbours
             const int i = n % 5, j = n / 5 % 5, k = n / 25;
+            if (cells.is_parted()) return spread_joined(c, n, exists, reached);
             for (int z = std::max(0, k - 1); z <= std::min(4, k + 1); ++z)
                 for (int y = std::max(0, j - 1); y <= std::min(4, j + 1); ++y)
                     for (int x = std::max(0, i - 1); x <= std::min(4, i + 1); ++x)
@@ -94,6 +97,18 @@ void Matter::find_together() {
             if (near[n]) spread(n);
         for (int n = 0; n < 125; ++n)
             if (reached[n]) together_[c][n / 64] |= std::uint64_t(1) << (n % 64);
+    }
+}
+
+/// find_together's `spread` where neighbours may be of different parts.
+void Matter::spread_joined(Index middle, int n, const std::array<bool, 125>& exists,
+                           std::array<bool, 125>& reached) const {
+    const auto& at = body_.cells.cells[middle];
+    const auto cell = [&](int m) { return cell_at(at[0] + m % 5 - 2, at[1] + m / 5 % 5 - 2, at[2] + m / 25 - 2); };
+    for (int m = 0; m < 125; ++m) {
+        const bool is_beside =
+            std::abs(n % 5 - m % 5) <= 1 && std::abs(n / 5 % 5 - m / 5 % 5) <= 1 && std::abs(n / 25 - m / 25) <= 1;
+        if (exists[m] && is_beside && body_.cells.are_joined(cell(n), cell(m))) reached[m] = true;
     }
 }
 
@@ -114,7 +129,10 @@ void Matter::find_cells_of_points() {
             least = away;
             cell_of_point_[s] = cell;
         }
-        if (cell_of_point_[s] != kNoIndex) continue;
+        if (cell_of_point_[s] != kNoIndex) {
+            if (cells.is_parted()) cell_of_point_[s] = nearest_cell(cells, at);
+            continue;
+        }
         is_loose_[s] = 1;
         cell_of_point_[s] = carrying_cell(s);
     }
@@ -154,7 +172,7 @@ bool Matter::are_in_three_steps(Index a, Index b) const {
     if (apart != 3) return false;
     for (int n = 0; n < 27; ++n) {
         const Index between = cell_at(to[0] + n % 3 - 1, to[1] + n / 3 % 3 - 1, to[2] + n / 9 - 1);
-        if (between != kNoIndex && are_together(a, between)) return true;
+        if (between != kNoIndex && are_together(a, between) && body_.cells.are_joined(between, b)) return true;
     }
     return false;
 }
@@ -199,7 +217,8 @@ std::optional<Index> Matter::neighbour(Index cell, Vec3f& local) const {
         std::array<int, 3> next = {at[0], at[1], at[2]};
         const int side = local[axis] < 0 ? -1 : 1;
         next[axis] += side;
-        if (const Index found = cell_at(next[0], next[1], next[2]); found != kNoIndex) {
+        if (const Index found = cell_at(next[0], next[1], next[2]);
+            found != kNoIndex && body_.cells.are_joined(cell, found)) {
             local[axis] -= float(side);
             return found;
         }
@@ -282,6 +301,11 @@ Vec3f Matter::rest_position(const Place& place) const {
 
 std::optional<Matter::Depth> Matter::depth(const Place& place, const Mat3f& inverse, const Vec3f& entry) const {
     const Vec3f rest = rest_position(place);
+    if (body_.cells.is_parted()) { // what is there at rest may be of another part, which the field does not tell
+        const auto& at = body_.cells.cells[place.cell];
+        const Index there = body_.cells.find_cell(Vec3d(Vec3d(at[0], at[1], at[2]) + place.local.cast<double>()));
+        if (there != kNoIndex && there != place.cell && !body_.cells.are_joined(place.cell, there)) return std::nullopt;
+    }
     DistanceField::Sample surface = body_.field->at(rest);
     surface.distance -= body_.field_radius;
     if (surface.distance < 0 && surface.normal.dot(entry) < kTurned) {

@@ -107,6 +107,7 @@ private:
     std::optional<Index> neighbour(Index cell, Vec3f& local) const;
     void find_rigid_box();
     void find_together();
+    void spread_joined(Index middle, int n, const std::array<bool, 125>& exists, std::array<bool, 125>& reached) const;
     void find_cells_of_points();
     Index carrying_cell(std::size_t surface_point) const;
 

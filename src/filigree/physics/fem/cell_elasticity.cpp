@@ -2,10 +2,14 @@
 #include "filigree/core/math.h"
 #include "filigree/core/parallel_sum.h"
 #include "filigree/physics/body.h"
+#include "filigree/physics/body/fields.h"
 #include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/fem/cell_kernel.h"
 
+#include <bit>
 #include <cmath>
+#include <optional>
+#include <tuple>
 
 namespace filigree {
 
@@ -29,26 +33,108 @@ double cell_energy(const cell_kernel::CellMaterial& m, const std::array<Vec3d, 8
             bulk * (0.5 * (J - 1) * (J + 1 - 2 * g) + cell_kernel::crush_energy(m, J, filled)));
 }
 
+/// A lattice without copies of corners, for the loops of cell_kernel: cells beside each other that do not hang together
+/// lie in different layers of it, one above the other. Its corners follow the body's, several one of these.
+class StackedCells {
+public:
+    explicit StackedCells(const Body& body) : scratch_(0) {
+        const Cells& cells = body.cells;
+        std::vector<unsigned> level(cells.cells.size(), 0);
+        int most = 0;
+        for (const auto& at : cells.cells) most = std::max(most, int(at[2]));
+        std::vector<std::pair<Cells::LatticeIndex, Index>> stacked;
+        for (Index c = 0; c < level.size(); ++c) {
+            level[c] = free_level(cells, c, level);
+            Cells::LatticeIndex at = cells.cells[c];
+            at[2] = std::uint16_t(unsigned(at[2]) + level[c] * unsigned(most + 3));
+            stacked.emplace_back(at, c);
+        }
+        const auto order = [](const auto& entry) { return std::tie(entry.first[2], entry.first[1], entry.first[0]); };
+        std::ranges::sort(stacked, {}, order);
+        std::vector<Cells::LatticeIndex> indices;
+        std::vector<Index> own; // cells of the body
+        for (const auto& [at, cell] : stacked) {
+            indices.push_back(at);
+            own.push_back(cell);
+        }
+        body_.material = body.material;
+        body_.cells = lattice_cells(std::move(indices), cells.spacing, cells.origin);
+        body_.fields = part_of(body.fields, own);
+        corner_of_.resize(body_.cells.corners.size());
+        for (Index c = 0; c < own.size(); ++c) {
+            body_.cells.fraction[c] = cells.fraction[own[c]];
+            for (int n = 0; n < 8; ++n) corner_of_[body_.cells.cell_corners[c][n]] = cells.cell_corners[own[c]][n];
+        }
+        scratch_ = Vectors(corner_of_.size());
+    }
+
+    const Body& body() const { return body_; }
+    Vectors& forces() { return scratch_; }
+    Vectors gathered(const Vectors& from) const {
+        Vectors to(corner_of_.size());
+        for (std::size_t c = 0; c < corner_of_.size(); ++c) to.set(c, from[corner_of_[c]]);
+        return to;
+    }
+    void scatter(Vectors& to) const {
+        for (std::size_t c = 0; c < to.size(); ++c) to.set(c, Vec3f::Zero());
+        for (std::size_t c = 0; c < corner_of_.size(); ++c) to.add(corner_of_[c], scratch_[c]);
+    }
+
+private:
+    /// The lowest level in which all cells around that are there have the same corners where they meet the cell.
+    static unsigned free_level(const Cells& cells, Index cell, std::span<const unsigned> level) {
+        const auto& at = cells.cells[cell];
+        std::uint32_t taken = 0;
+        for (int n = 0; n < 27; ++n) {
+            const std::array<int, 3> step = {n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1};
+            const Index other = cells.find_cell(at[0] + step[0], at[1] + step[1], at[2] + step[2]);
+            if (other == kNoIndex || other >= cell) continue; // later
+            for (int corner = 0; corner < 8; ++corner) {
+                int same = 0; // the other's number of this lattice point
+                bool meets = true;
+                for (int axis = 0; axis < 3; ++axis) {
+                    const int bit = (corner >> axis & 1) - step[axis];
+                    meets = meets && (bit == 0 || bit == 1);
+                    same |= (bit & 1) << axis;
+                }
+                if (meets && cells.cell_corners[cell][corner] != cells.cell_corners[other][same])
+                    taken |= 1u << level[other];
+            }
+        }
+        return unsigned(std::countr_one(taken));
+    }
+
+    Body body_; ///< its cells and what they are made of
+    std::vector<Index> corner_of_;
+    Vectors scratch_;
+};
+
 class CellElasticity final : public Elasticity {
 public:
-    explicit CellElasticity(const Body& body) : body_(body), plan_(cell_kernel::make_plan(body)) {}
+    explicit CellElasticity(const Body& body) : body_(body) {
+        if (body.cells.is_parted()) stacked_.emplace(body);
+        plan_ = cell_kernel::make_plan(stacked_ ? stacked_->body() : body);
+    }
 
     ElasticReport forces(const Vectors& positions, Vectors& forces, const RunContext& context) override {
+        if (stacked_) return stacked_forces(positions, nullptr, forces, context);
         return cell_kernel::forces(plan_, positions, forces, sums_, context);
     }
 
     ElasticReport damped_forces(const Vectors& positions, const InternalDamping& damping, Vectors& forces,
                                 const RunContext& context) override {
+        if (stacked_) return stacked_forces(positions, &damping, forces, context);
         return cell_kernel::forces(plan_, positions, forces, sums_, context, &damping);
     }
 
     double energy(const Vectors& positions, const RunContext& context) const override {
         const Cells& cells = body_.cells;
+        const std::vector<float>& stiffness = body_.fields.stiffness;
         return parallel_sum(context, cells.cells.size(), 1024, [&](std::size_t cell) {
             std::array<Vec3d, 8> corners;
             for (int c = 0; c < 8; ++c) corners[c] = positions[cells.cell_corners[cell][c]].cast<double>();
             const double energy = cell_energy(plan_.material, corners, cells.fraction[cell]);
-            return plan_.stiffness.empty() ? energy : energy * double(plan_.stiffness[cell]);
+            return stiffness.empty() ? energy : energy * double(stiffness[cell]);
         });
     }
 
@@ -57,7 +143,21 @@ public:
     }
 
 private:
+    ElasticReport stacked_forces(const Vectors& positions, const InternalDamping* damping, Vectors& forces,
+                                 const RunContext& context) {
+        InternalDamping inside;
+        if (damping) {
+            inside = *damping;
+            inside.velocities = stacked_->gathered(damping->velocities);
+        }
+        const ElasticReport report = cell_kernel::forces(plan_, stacked_->gathered(positions), stacked_->forces(),
+                                                         sums_, context, damping ? &inside : nullptr);
+        stacked_->scatter(forces);
+        return report;
+    }
+
     const Body& body_;
+    std::optional<StackedCells> stacked_; ///< of a body whose corners have copies
     cell_kernel::Plan plan_;
     cell_kernel::Sums sums_;
 };
