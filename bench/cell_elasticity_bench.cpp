@@ -35,6 +35,27 @@ void forces(benchmark::State& state, int lanes, unsigned threads) {
     count_cells(state, s);
 }
 
+/// The same where stiffness and density vary.
+void forces_of_fields(benchmark::State& state) {
+    const ShakenBox& s = box(state.range(0));
+    Body varied = s.body;
+    BodyFields fields;
+    for (std::size_t c = 0; c < s.cell_count(); ++c) {
+        fields.stiffness.push_back(float(1 + c % 7));
+        fields.density.push_back(float(1 + c % 3));
+    }
+    if (!set_fields(varied, fields)) return state.SkipWithError("no fields");
+    const cell_kernel::Plan plan = cell_kernel::make_plan(varied);
+    const RunContext context(1);
+    Vectors result(s.positions.size());
+    cell_kernel::Sums sums;
+    for (auto _ : state) {
+        cell_kernel::forces(plan, s.positions, result, sums, context);
+        benchmark::DoNotOptimize(result.x.data());
+    }
+    count_cells(state, s);
+}
+
 void plain(benchmark::State& state) {
     const ShakenBox& s = box(state.range(0));
     Vectors result(s.positions.size());
@@ -58,6 +79,7 @@ void plain(benchmark::State& state) {
 
 const bool kRegistered = [] {
     benchmark::RegisterBenchmark("plain_forces", plain)->Arg(8000)->Arg(200000);
+    benchmark::RegisterBenchmark("forces/fields", forces_of_fields)->Unit(benchmark::kMicrosecond)->Arg(8000);
     for (const int lanes : cell_kernel::lane_counts()) {
         const std::string suffix = "/lanes:" + std::to_string(lanes);
         auto* f = benchmark::RegisterBenchmark(("forces" + suffix).c_str(), forces, lanes, 1u);

@@ -68,6 +68,17 @@ struct SceneBody {
     std::optional<Vec3f> color = {};
 };
 
+/// A quantity that varies within a body, by what its mesh carries.
+struct SceneMap {
+    unsigned line = 0;
+    std::string named;
+    std::size_t body = 0;
+    FieldOf of = FieldOf::stiffness;
+    std::string from;                       ///< "color.r", "scalar NAME", "group NAME", "material NAME", "object NAME"
+    std::array<double, 2> values = {0, 1};  ///< numbers of the mesh that count as the ends of `range`
+    std::array<double, 2> range = {0.1, 1}; ///< multiples of the material's value
+};
+
 struct SceneObstacle {
     unsigned line = 0;
     std::string shape; ///< ground, ball, box or mesh: says which of the next counts
@@ -162,6 +173,7 @@ struct SceneFile {
     StepOptions step;
     World world; ///< air, heat, contact; without the lists that follow
     std::vector<SceneBody> bodies;
+    std::vector<SceneMap> maps;
     std::vector<SceneObstacle> obstacles;
     std::vector<SceneFracture> fractures;
     std::vector<SceneCrack> cracks;

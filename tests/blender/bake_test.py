@@ -8,7 +8,7 @@ import numpy as np
 
 import filigree
 import filigree_detail
-from filigree_detail import baking, meshes, obstacles
+from filigree_detail import baking, meshes, obstacles, simulating
 from stage import activate, add, begin, bend, largest, refused, run_all, shown
 
 folder = tempfile.TemporaryDirectory(prefix="filigree-blender-")
@@ -106,6 +106,24 @@ def test_a_body_falls_on_a_moving_ground():
     heights = [(frame - 1) / 29 for frame in range(1, 31)]  # as keys ease in and out, between these
     assert min(lowest) < 0.9 and lowest[-1] > 0.9, lowest
     assert heights[-1] == 1
+
+
+def test_a_vertex_group_says_where_a_body_is_soft():
+    in_a_file()
+    scene = bpy.context.scene
+    scene.frame_end = 8
+    body = scene.filigree_body
+    body.particles, body.soft_group, body.softness = 200, "belly", 0.2
+    high = add(filigree.make("wavy-cube", resolution=8), "cube")
+    bpy.ops.filigree.make_driver(vertices=100)
+    refused(bpy.ops.filigree.simulate, "no vertex group 'belly'")
+    group = high.vertex_groups.new(name="belly")
+    group.add([v.index for v in high.data.vertices if v.co.z < 0], 0.5, "REPLACE")
+    fields = simulating.fields_of(body, high)
+    weights = np.where(meshes.vertices_of(high.data)[:, 2] < 0, 0.6, 1)
+    assert np.allclose(fields["stiffness"], weights, atol=1e-6)
+    assert bpy.ops.filigree.simulate() == {"FINISHED"}
+    body.soft_group = ""
 
 
 def test_an_obstacle_spins_on_through_full_turns():

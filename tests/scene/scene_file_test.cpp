@@ -209,6 +209,37 @@ TEST_F(SceneFileTest, ReadsWhatBreaks) {
     EXPECT_NE(refusal("[[body]]\nshape = \"bar\"\n[[crack]]\n").find("no [[fracture]]"), std::string::npos);
 }
 
+TEST_F(SceneFileTest, ReadsMaps) {
+    const std::string map = "[[map]]\nof = \"density\"\nfrom = \"color.g\"\n";
+    const SceneFile scene = this->scene(kDrop + map + "range = [2, 0.5]\nvalues = [0.2, 0.8]\n");
+    ASSERT_EQ(scene.maps.size(), 1U);
+    EXPECT_EQ(scene.maps[0].of, FieldOf::density);
+    EXPECT_EQ(scene.maps[0].from, "color.g");
+    EXPECT_EQ(scene.maps[0].range, (std::array<double, 2>{2, 0.5}));
+    EXPECT_EQ(scene.maps[0].values, (std::array<double, 2>{0.2, 0.8}));
+    EXPECT_EQ(this->scene(kDrop + map).maps[0].range, (std::array<double, 2>{0.1, 1}));
+    const auto says = [&](const std::string& text, const char* what) {
+        const std::string said = refusal(kDrop + text);
+        EXPECT_NE(said.find(what), std::string::npos) << said;
+    };
+    says("[[map]]\nfrom = \"color.g\"\n", "14: [[map]] needs `of`: what varies.");
+    says("[[map]]\nof = \"density\"\n", "14: [[map]] needs `from`");
+    says("[[map]]\nof = \"mass\"\nfrom = \"color.g\"\n",
+         "15: 'of' in [[map]] must be one of stiffness, density, damping, yield_stress, strength, and is \"mass\".");
+    says("[[map]]\nof = \"density\"\nfrom = \"colour\"\n", "16: 'colour' names no numbers of a mesh");
+    says(map + "range = [0, 1]\n", "17: 'range' in [[map]] must be a number, 0.001 to 1000, and is 0.");
+    says(map + "values = [1, 1]\n", "17: the two values of 'values' are the same.");
+    says(map + map, "18: a body has one [[map]] of density at most.");
+    says(map + "body = \"ball\"\n", "there is no body 'ball'");
+    says("[[map]]\nof = \"yield_stress\"\nfrom = \"color.g\"\n", "is for a body with a yield_stress");
+    says("[[map]]\nof = \"strength\"\nfrom = \"color.g\"\n", "is for a body with a [[fracture]]");
+    EXPECT_NE(refusal("[[body]]\nshape = \"bar\"\nmodel = \"springs\"\n" + map).find("models fem and rigid"),
+              std::string::npos);
+    const std::string many = "[[body]]\nname = \"a\"\nshape = \"bar\"\nrepeat = { count = 3, step = [1, 0, 0] }\n";
+    EXPECT_EQ(this->scene(many + map).maps.size(), 3U);
+    EXPECT_NE(refusal(many + map + "body = \"a.2\"\n").find("are alike; name 'a'"), std::string::npos);
+}
+
 TEST_F(SceneFileTest, ContentIsTheMotionsAlone) {
     const std::string content = scene(kDrop).content;
     EXPECT_EQ(scene("# a comment\n" + kDrop + "[picture]\nview = \"top\"\n").content, content);

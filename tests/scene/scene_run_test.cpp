@@ -2,6 +2,7 @@
 #include "threads.h"
 
 #include "filigree/file.h"
+#include "filigree/scene/mesh_map.h"
 #include "filigree/scene/particles_near.h"
 #include "filigree/scene/saved_state.h"
 
@@ -43,6 +44,62 @@ TEST_F(SceneRunTest, ASceneInOneCallMovesAsARunFrameByFrame) {
     RunContext cancelled;
     cancelled.cancel();
     EXPECT_EQ(simulate_scene(dropped, cancelled).error().code, ErrorCode::cancelled);
+}
+
+TEST_F(SceneRunTest, MapsSayWhatVariesInABody) {
+    Mesh mesh = make_bar({.resolution = 4, .length = 3});
+    for (const Vec3f& p : mesh.positions) mesh.colors.push_back({p.x() > 0 ? 1.0f : 0.0f, 0, 0, 1});
+    ASSERT_TRUE(write_mesh(mesh, beside("bar.ply")).ok());
+    const std::string body = "[simulation]\nframes = 6\n[[body]]\nmesh = \"bar.ply\"\nsize = 0.3\nparticles = 400\n";
+    const std::string map = "[[map]]\nof = \"stiffness\"\nfrom = \"color.r\"\nrange = [0.2, 1]\n"
+                            "[[map]]\nof = \"density\"\nfrom = \"color.r\"\nrange = [3, 1]\n";
+    const auto plain = made(body), varied = made(body + map);
+    const Body& found = *varied->ready.bodies[0].body;
+    for (std::size_t c = 0; c < found.cells.cells.size(); ++c) {
+        const float x = found.cells.centroid[c].x();
+        if (std::abs(x) < 0.09f) continue;
+        EXPECT_NEAR(found.fields.stiffness[c], x > 0 ? 1 : 0.2, 0.02) << x;
+        EXPECT_NEAR(found.fields.density[c], x > 0 ? 1 : 3, 0.05) << x;
+    }
+    EXPECT_NEAR(varied->ready.bodies[0].report.mass / plain->ready.bodies[0].report.mass, 2, 0.1);
+    EXPECT_NE(varied->ready.hash, plain->ready.hash);
+    const std::string half = state_after(*varied, 3), through = state_after(*made(body + map), 6);
+    const auto resumed = made(body + map);
+    ASSERT_TRUE(resumed->run->resume(half, "half"));
+    EXPECT_EQ(state_after(*resumed, 6), through);
+    EXPECT_FALSE(plain->run->resume(half, "half").ok());
+    // Other colours in the same file are another scene.
+    for (Vec4f& color : mesh.colors) color[0] *= 0.5f;
+    ASSERT_TRUE(write_mesh(mesh, beside("bar.ply")).ok());
+    EXPECT_NE(made(body + map)->ready.hash, varied->ready.hash);
+
+    const SceneFile lacks = scene(body + "[[map]]\nof = \"density\"\nfrom = \"scalar wax\"\n");
+    const std::string said = set_up(lacks, kOneThread).error().message;
+    EXPECT_NE(said.find("scene.toml:7: The mesh has nothing for 'scalar wax'; it has no scalars."), std::string::npos)
+        << said;
+}
+
+TEST(MeshMap, TakesColoursScalarsAndLabels) {
+    Mesh mesh;
+    mesh.positions.resize(5, Vec3f::Zero());
+    mesh.add_face(std::array<Index, 3>{0, 1, 2});
+    mesh.add_face(std::array<Index, 3>{2, 1, 3});
+    mesh.colors = {{0, 0.1f, 0.2f, 1}, {1, 1, 1, 1}, {0, 0, 0, 0}, {0, 0.5f, 0, 1}, {0, 0, 0, 1}};
+    mesh.scalars = {{"fat", {1, 2, 3, 4, 5}}};
+    mesh.groups = {{"left_arm", "left_leg", "head"}, {1, 2}};
+    mesh.materials = {{"skin"}, {0, kNoIndex}};
+    using Values = std::vector<float>;
+    EXPECT_EQ(mesh_map(mesh, "color.g").value(), (Values{0.1f, 1, 0, 0.5f, 0}));
+    EXPECT_EQ(mesh_map(mesh, "color.a").value(), (Values{1, 1, 0, 1, 1}));
+    EXPECT_EQ(mesh_map(mesh, "scalar fat").value(), (Values{1, 2, 3, 4, 5}));
+    EXPECT_EQ(mesh_map(mesh, "group left_*").value(), (Values{1, 0.5f, 0.5f, 0, 0}));
+    EXPECT_EQ(mesh_map(mesh, "material skin").value(), (Values{1, 0.5f, 0.5f, 0, 0}));
+    EXPECT_EQ(mesh_map(mesh, "group tail").error().message,
+              "The mesh has nothing for 'group tail'; it has the groups left_arm, left_leg, head.");
+    EXPECT_EQ(mesh_map(mesh, "object a").error().message, "The mesh has nothing for 'object a'; it has no objects.");
+    EXPECT_EQ(mesh_map(mesh, "colour.r").error().code, ErrorCode::usage);
+    EXPECT_EQ(in_range({1, 2, 3, 9}, {1, 3}, {10, 0.5}), (Values{10, 5.25f, 0.5f, 0.5f}));
+    EXPECT_EQ(in_range({0, 1}, {1, 0}, {0.1, 1}), (Values{1, 0.1f})) << "the other way round";
 }
 
 TEST_F(SceneRunTest, EqualRunsSaveEqualBytes) {

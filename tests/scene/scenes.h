@@ -30,6 +30,8 @@ protected:
         std::ofstream(path) << text;
         return path;
     }
+    /// The path of a file in the scene's folder.
+    std::string beside(const std::string& name) const { return (folder_ / name).string(); }
     filigree::SceneFile scene(const std::string& text) const { return filigree::read_scene(write(text)).value(); }
     /// The sentence that a scene is refused with, from its line on.
     std::string refusal(const std::string& text) const {

@@ -24,6 +24,16 @@ def filigree_mesh(mesh, matrix=None):
     return filigree.Mesh(vertices, corners, np.append(starts, len(corners)))
 
 
+def group_weights(mesh, group):
+    """Weights of a vertex group by its index, 0 where a vertex is not in it: float32 (n,)."""
+    weights = np.zeros(len(mesh.vertices), np.float32)
+    for vertex in mesh.vertices:
+        for element in vertex.groups:
+            if element.group == group:
+                weights[vertex.index] = element.weight
+    return weights
+
+
 def moved(points, matrix):
     """Points (n, 3) by a 4x4 matrix, float32."""
     m = np.array(matrix, np.float64)

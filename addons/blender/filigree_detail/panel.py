@@ -102,6 +102,9 @@ class FILIGREE_PT_body(_Panel, bpy.types.Panel):
         body = context.scene.filigree_body
         for name in ("material", "particles", "obstacles"):
             layout.prop(body, name)
+        layout.prop_search(body, "soft_group", context.object, "vertex_groups")
+        if body.soft_group:
+            layout.prop(body, "softness")
         layout.operator("filigree.simulate", icon="PHYSICS")
         for name in ("pieces", "strength"):
             layout.prop(body, name)

@@ -18,12 +18,27 @@ class FiligreeBody(bpy.types.PropertyGroup):
     material: bpy.props.EnumProperty(name="Material", items=_materials())
     particles: bpy.props.IntProperty(
         name="Particles", default=4000, min=50, soft_max=100000, description="That fill the mesh, about")
+    soft_group: bpy.props.StringProperty(
+        name="Soft", description="Vertex group: where its weight is 1, the stiffness is multiplied by Softness. Empty: all is alike")
+    softness: bpy.props.FloatProperty(
+        name="Softness", default=0.1, min=0.001, max=1000, soft_max=10,
+        description="Stiffness where the vertex group's weight is 1, as a multiple of the material's; above 1 it is stiffer")
     obstacles: bpy.props.PointerProperty(
         name="Obstacles", type=bpy.types.Collection,
         description="What the body touches: the meshes of this collection, with their motion. A flat one is a ground without end")
     pieces: bpy.props.IntProperty(name="Pieces", default=24, min=2, soft_max=200, description="That the body may break into")
     strength: bpy.props.FloatProperty(
         name="Strength", default=0, min=0, description="Stress at which cracks begin, Pa; 0: a hundredth of the material's stiffness")
+
+
+def fields_of(body, high):
+    """What varies within the body: by the vertex group that it names."""
+    if not body.soft_group:
+        return {}
+    group = high.vertex_groups.get(body.soft_group)
+    if group is None:
+        raise filigree.UsageError(f"{high.name} has no vertex group {body.soft_group!r}, which the panel Body names as Soft.")
+    return {"stiffness": 1 + (body.softness - 1) * meshes.group_weights(high.data, group.index)}
 
 
 def frame_range(scene):
@@ -55,10 +70,10 @@ class FILIGREE_OT_simulate(JobOperator, bpy.types.Operator):
         mesh = meshes.filigree_mesh(high.data, to_world)
         points = meshes.moved(models.model_of(high.filigree).driver.vertices, to_world)
         options = {"gravity": gravity(scene), "frames_per_second": frame_rate(scene)}
-        material, particles = body.material, body.particles
+        material, particles, fields = body.material, body.particles, fields_of(body, high)
 
         def compute(progress):
-            made = filigree.Body(mesh, material, particles=particles, progress=progress)
+            made = filigree.Body(mesh, material, particles=particles, fields=fields, progress=progress)
             simulation = filigree.Simulation([made], obstacles=[o.for_simulation() for o in touched], **options)
             followed, poses = simulation.attach(0, points), [points]
             for frame in range(1, len(frames)):

@@ -2,6 +2,7 @@
 
 #include "calls.h"
 
+#include <filigree/physics/body/fields.h>
 #include <filigree/physics/material.h>
 #include <filigree/scene/particles_near.h>
 #include <filigree/scene/scene_keys.h>
@@ -48,9 +49,24 @@ Material make_material(const std::string& name, const py::kwargs& changes) {
     refuse("There is no material '" + name + "'; there are " + known + ".");
 }
 
+FieldOf field_of_name(const std::string& name) {
+    std::vector<std::pair<std::string_view, FieldOf>> words;
+    for (const FieldOf field : kFields) words.emplace_back(name_of(field), field);
+    return value_of(name, "A field's name", words);
+}
+
+/// Calls visit(field, its numbers) for each field of a dict.
+template <class Visit>
+void each_field(const py::dict& fields, const Visit& visit) {
+    for (const auto& [key, value] : fields) {
+        const auto name = py::cast<std::string>(py::str(key));
+        visit(field_of_name(name), values_of(value, name.c_str()));
+    }
+}
+
 PyBody make_one(const py::object& given, const py::object& material, std::optional<std::size_t> particles,
-                std::optional<double> spacing, double scale, std::optional<double> size, unsigned threads,
-                const py::object& progress) {
+                std::optional<double> spacing, double scale, std::optional<double> size, const py::dict& fields,
+                bool separate, unsigned threads, const py::object& progress) {
     const MeshPtr mesh = mesh_of(given);
     const Material of = material_of(material);
     BodyOptions options;
@@ -60,12 +76,37 @@ PyBody make_one(const py::object& given, const py::object& material, std::option
     options.cells.count = particles.value_or(options.cells.count);
     if (spacing && !(*spacing > 0)) refuse("spacing has to be above 0.");
     options.cells.spacing = spacing.value_or(0);
+    options.separate = separate;
+    each_field(fields, [&](FieldOf of, std::vector<float> values) {
+        options.fields.push_back({of, std::move(values)});
+    });
     PyBody made{nullptr, mesh->origin};
     made.body = LongCall{threads, progress}([&](const RunContext& context) {
         return std::make_shared<const Body>(make_body(*mesh, of, options, context, &made.report).value());
     });
     if (!made.report.warning.empty()) warn({made.report.warning});
     return made;
+}
+
+PyBody with_fields(const PyBody& self, const py::dict& fields) {
+    Body body = *self.body;
+    BodyFields all = body.fields;
+    each_field(fields, [&](FieldOf of, std::vector<float> values) { all.of(of) = std::move(values); });
+    if (const Status set = set_fields(body, std::move(all)); !set) refuse(set.error().code, set.error().message);
+    if (const std::string warning = fields_warning(body); !warning.empty()) warn({warning});
+    PyBody changed = self;
+    changed.report.mass = 0;
+    for (const float mass : body.mass) changed.report.mass += double(mass);
+    changed.body = std::make_shared<const Body>(std::move(body));
+    return changed;
+}
+
+py::dict fields_of(const py::object& self) {
+    py::dict fields;
+    for (const FieldOf of : kFields)
+        if (const std::vector<float>& field = self.cast<const PyBody&>().body->fields.of(of); !field.empty())
+            fields[py::str(std::string(name_of(of)))] = view(field, self);
+    return fields;
 }
 
 py::dict body_report(const PyBody& self) {
@@ -78,6 +119,7 @@ py::dict body_report(const PyBody& self) {
     said["loose_parts"] = report.cells.loose_parts;
     said["volume"] = report.cells.volume;
     said["joined_corners"] = report.joined.corners;
+    said["separated_corners"] = report.separated_corners;
     said["surface_points"] = report.surface_points;
     said["mass"] = report.mass;
     said["warning"] = report.warning;
@@ -169,6 +211,13 @@ scale : float
     Metres a model unit, above 0.
 size : float, optional
     m, above 0: the longest side of the mesh's box; in place of `scale`.
+fields : dict of str to array_like, (v,)
+    What varies within the body: 'stiffness', 'density', 'damping', 'yield_stress' (of the material) or 'strength' (of its
+    fracture). One multiple of the material's value a vertex of the mesh, 0.001 to 1000; they are spread inwards. For the
+    models 'fem' and 'rigid'.
+separate : bool
+    Whether parts that are nearer to each other than two particles (fingers, lips) move apart: from gaps of a quarter of
+    the spacing on. For the model 'fem'; such a body does not break.
 
 Raises
 ------
@@ -177,7 +226,8 @@ UsageError, UnsuitableError, Cancelled
 Warns
 -----
 FiligreeWarning
-    Parts thinner than two cells, or so near each other that they are joined.
+    Parts thinner than two cells, or so near each other that they are joined; stiffness beyond 0.1 to 10 times the
+    material's.
 
 Examples
 --------
@@ -188,8 +238,9 @@ Examples
         .def(
             py::init(&make_one), py::arg("mesh"), py::arg("material") = "rubber", py::kw_only(),
             py::arg("particles") = py::none(), py::arg("spacing") = py::none(), py::arg("scale") = 1.0,
-            py::arg("size") = py::none(), py::arg("threads") = 0, py::arg("progress") = py::none(),
-            R"(__init__(self, mesh, material='rubber', *, particles=None, spacing=None, scale=1.0, size=None, threads=0, progress=None)
+            py::arg("size") = py::none(), py::arg("fields") = py::dict(), py::arg("separate") = false,
+            py::arg("threads") = 0, py::arg("progress") = py::none(),
+            R"(__init__(self, mesh, material='rubber', *, particles=None, spacing=None, scale=1.0, size=None, fields={}, separate=False, threads=0, progress=None)
 --
 
 )")
@@ -208,6 +259,38 @@ Examples
         .def_property_readonly(
             "volume", [](const py::object& self) { return view(self.cast<const PyBody&>().body->volume, self); },
             "Of each particle, m^3, float32 (p,), read-only.")
+        .def_property_readonly(
+            "cells", [](const py::object& self) { return view(self.cast<const PyBody&>().body->cells.centroid, self); },
+            "Of each cell, the middle of what it holds of the body at rest, m, float32 (c, 3), read-only.")
+        .def_property_readonly("fields", &fields_of,
+                               "What varies: by name one multiple a cell, float32 (c,), read-only. A copy of the dict.")
+        .def("with_fields", &with_fields, py::arg("fields"), R"(with_fields(self, fields)
+--
+
+The same body with other fields.
+
+Parameters
+----------
+fields : dict of str to array_like, (c,)
+    As of `Body`, but one multiple a cell (`cells` says where they are). Others stay; an empty array takes one away.
+
+Returns
+-------
+Body
+    A new one. Simulations keep the bodies that they were made with.
+
+Raises
+------
+UsageError
+    Another number of values than cells; a value outside 0.001 to 1000; a model other than 'fem' and 'rigid'.
+
+Examples
+--------
+>>> body = filigree.Body(filigree.make("bar", resolution=4), "jelly", spacing=0.25)
+>>> body = body.with_fields({"density": 1 + 2 * (body.cells[:, 0] > 0)})
+>>> body.mass.sum()
+8000.0
+)")
         .def_property_readonly("report", &body_report, "What it took: counts, 'volume' (m^3), 'mass' (kg), 'warning'.")
         .def(
             "particles_near",

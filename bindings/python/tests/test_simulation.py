@@ -30,6 +30,29 @@ def test_forces_of_ones_own(body):
     assert simulation.momentum()[0][1] <= before
 
 
+def test_fields_of_vertices_and_cells():
+    stiff = 1 + 4 * (BAR.vertices[:, 0] > 0)
+    varied = filigree.Body(BAR, "jelly", spacing=0.25, fields={"stiffness": stiff})
+    assert set(varied.fields) == {"stiffness"} and len(varied.cells) == len(varied.fields["stiffness"])
+    right = varied.cells[:, 0] > 0
+    found = varied.fields["stiffness"]
+    assert found[varied.cells[:, 0] > 1.2].min() > 4.8 and found[varied.cells[:, 0] < -1.2].max() < 1.1
+    assert found.min() >= 1 and found.max() <= 5
+    heavy = varied.with_fields({"density": numpy.where(right, 3, 1)})
+    assert heavy.mass.sum() == pytest.approx(2 * varied.report["mass"])
+    assert heavy.report["mass"] == pytest.approx(heavy.mass.sum())
+    assert same(heavy.fields["stiffness"], varied.fields["stiffness"])
+    assert not heavy.with_fields({"density": [], "stiffness": []}).fields
+    with pytest.raises(filigree.UsageError, match="has to be one of 'stiffness', 'density'"):
+        filigree.Body(BAR, fields={"mass": stiff})
+    with pytest.raises(filigree.UsageError, match="give one value a vertex"):
+        filigree.Body(BAR, fields={"density": [1, 2]})
+    with pytest.raises(filigree.UsageError, match="has 2 values, and the body has"):
+        varied.with_fields({"density": [1, 2]})
+    with pytest.warns(filigree.FiligreeWarning, match="stiffness varies from 1 to 25"):
+        filigree.Body(BAR, "jelly", spacing=0.25, fields={"stiffness": 1 + 6 * (stiff - 1)})
+
+
 def test_pins_hold_and_move(body):
     held = numpy.flatnonzero(body.rest[:, 0] < body.rest[:, 0].min() + 1e-4)
     motion = filigree.RigidMotion([0, 1], move=[[0, 0, 0], [0, 0.5, 0]])

@@ -5,7 +5,9 @@
 #include "filigree/file.h"
 #include "filigree/io/model/model_file.h"
 #include "filigree/io/system/file.h"
+#include "filigree/physics/body/fields.h"
 #include "filigree/physics/material.h"
+#include "filigree/scene/mesh_map.h"
 #include "filigree/scene/scene_table.h"
 #include "filigree/scene/world_setup.h"
 
@@ -22,16 +24,6 @@ namespace filigree {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Whether a name is what a pattern says, in which * stands for any letters.
-bool fits(std::string_view name, std::string_view pattern) {
-    const std::size_t star = pattern.find('*');
-    if (star == std::string_view::npos) return name == pattern;
-    if (!name.starts_with(pattern.substr(0, star))) return false;
-    for (std::size_t from = star; from <= name.size(); ++from)
-        if (fits(name.substr(from), pattern.substr(star + 1))) return true;
-    return false;
-}
 
 /// The k-th of a repeated body.
 SceneBody repeated(const SceneBody& body, const SceneRepeat& repeat, std::size_t k) {
@@ -115,6 +107,7 @@ public:
         each("obstacle", [&](const SceneTable& in) { read_obstacle(in); });
         each("fracture", [&](const SceneTable& in) { read_fractures(in); });
         each("crack", [&](const SceneTable& in) { read_crack(in); });
+        each("map", [&](const SceneTable& in) { read_maps(in); });
         each("pin", [&](const SceneTable& in) { read_pins(in); });
         each("force", [&](const SceneTable& in) { read_forces(in); });
         each("heat", [&](const SceneTable& in) { in.read(&scene_.world.heat_sources.emplace_back()); });
@@ -297,7 +290,7 @@ private:
         if (name.empty()) in.fail("[[pair]] needs first and second: names of bodies or materials");
         std::vector<std::size_t> found;
         for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
-            if (fits(scene_.bodies[b].name, name) || scene_.bodies[b].group == name) found.push_back(b);
+            if (fits_pattern(scene_.bodies[b].name, name) || scene_.bodies[b].group == name) found.push_back(b);
         if (!found.empty()) return found;
         for (std::size_t b = 0; b < scene_.bodies.size(); ++b)
             if (scene_.bodies[b].material_name == name) found.push_back(b);
@@ -382,6 +375,37 @@ private:
         if (std::ranges::count(scene_.fractures, crack.body, &SceneFracture::body) == 0)
             in.fail("this body has no [[fracture]]");
         scene_.cracks.push_back(std::move(crack));
+    }
+
+    void read_maps(const SceneTable& in) {
+        SceneMap map;
+        map.line = in.line();
+        if (!in.has("of")) in.fail("[[map]] needs `of`: what varies");
+        if (!in.has("from")) in.fail("[[map]] needs `from`: the mesh's numbers, such as \"color.r\"");
+        in.read(&map);
+        if (const std::string wrong = check_mesh_map(map.from); !wrong.empty()) in.fail("from", wrong);
+        if (map.values[0] == map.values[1]) in.fail("values", "the two values of 'values' are the same");
+        for (const std::size_t number : bodies_of(in, map.named)) {
+            const SceneBody& body = scene_.bodies[number];
+            if (!body.group.empty() && body.group != map.named && !map.named.empty())
+                in.fail("body", fmt::format("bodies of one [[body]] are alike; name '{}'", body.group));
+            check_map(in, map.of, number);
+            map.body = number;
+            scene_.maps.push_back(map);
+        }
+    }
+    void check_map(const SceneTable& in, FieldOf of, std::size_t number) const {
+        const Material& material = scene_.bodies[number].material;
+        if (material.model != MaterialModel::fem && material.model != MaterialModel::rigid)
+            in.fail(fmt::format("a [[map]] is for bodies of the models fem and rigid, and '{}' is of another",
+                                scene_.bodies[number].name));
+        if (of == FieldOf::yield_stress && !material.is_plastic())
+            in.fail("of", "a map of yield_stress is for a body with a yield_stress");
+        if (of == FieldOf::strength && std::ranges::count(scene_.fractures, number, &SceneFracture::body) == 0)
+            in.fail("of", "a map of strength is for a body with a [[fracture]]");
+        for (const SceneMap& other : scene_.maps)
+            if (other.body == number && other.of == of)
+                in.fail("of", fmt::format("a body has one [[map]] of {} at most", filigree::name_of(of)));
     }
 
     void read_hand(const SceneTable& in) {

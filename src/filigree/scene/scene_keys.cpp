@@ -102,6 +102,11 @@ const SceneKey kKeys[] = {
     key<&SceneBody::body, &BodyOptions::cells, &CellOptions::spacing>(
         "body", "spacing", "m", above(0, 1e6), "in place of `particles`: distance from one particle to the next",
         "by `particles`"),
+    key<&SceneBody::body, &BodyOptions::separate>("body", "separate", "", kAnything,
+                                                  "whether parts that are nearer to each other than two particles, "
+                                                  "such as fingers, move apart; gaps from a quarter "
+                                                  "of a spacing on count, and such a body does not break",
+                                                  "", models("fem")),
     key<&SceneBody::material_name>("body", "material", "", kAnything,
                                    "one of the materials below; the keys from `model` on override its values"),
     key<&Material::model>("body", "model", "", one_of("fem springs meshfree rigid mpm"),
@@ -159,6 +164,24 @@ const SceneKey kKeys[] = {
                                "rigid: whether the body sleeps (costs nothing) while it lies still on something"),
     key<&SceneBody::color>("body", "color", "", kAnything, "colour in pictures, `\"#rrggbb\"`",
                            "by the number of the body"),
+
+    key<&SceneMap::named>("map", "body", "", kAnything,
+                          "name of the body, or of a repeated body, in which something varies; its model has to be fem "
+                          "or rigid",
+                          "the only body"),
+    key<&SceneMap::of>("map", "of", "", one_of("stiffness density damping yield_stress strength"),
+                       "what varies: young_modulus, density, damping or yield_stress of the [[body]], or strength of "
+                       "its [[fracture]]; each once a body",
+                       "required"),
+    key<&SceneMap::from>(
+        "map", "from", "", kAnything,
+        "numbers of the mesh's vertices: `\"color.r\"` (or g, b, a: 0 to 1), `\"scalar NAME\"`, or `\"group NAME\"`, "
+        "`\"object NAME\"`, `\"material NAME\"` (1 there, 0 elsewhere; `*` stands for any letters)",
+        "required"),
+    key<&SceneMap::values>("map", "values", "", kAnything,
+                           "two numbers of the mesh that get the ends of `range`; numbers beyond them get the same"),
+    key<&SceneMap::range>("map", "range", "", from(1e-3, 1e3),
+                          "two multiples of the body's own value; straight in between"),
 
     key<&SceneObstacle::shape>("obstacle", "shape", "", one_of("ground ball box mesh"),
                                "shape of the obstacle; required"),

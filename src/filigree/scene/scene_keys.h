@@ -12,16 +12,16 @@ namespace filigree {
 /// A struct that keys fill. Those of a table fill one or several.
 using SceneOwner =
     std::variant<SceneFile*, StepOptions*, World*, SceneBody*, ShapeOptions*, Material*, SceneObstacle*, HeatSource*,
-                 ScenePair*, SceneFracture*, SceneCrack*, ScenePin*, SceneForce*, SceneHand*, ScenePicture*>;
+                 SceneMap*, ScenePair*, SceneFracture*, SceneCrack*, ScenePin*, SceneForce*, SceneHand*, ScenePicture*>;
 
 /// Where the value of a key goes. Its type says what stands in the file: an enum a word, a Vec3f a colour.
 using KeyPlace =
-    std::variant<double*, unsigned*, unsigned long*, unsigned long long*, bool*, std::string*, StepMode*,
+    std::variant<double*, unsigned*, unsigned long*, unsigned long long*, bool*, std::string*, StepMode*, FieldOf*,
                  MaterialModel*, FracturePatternKind*, View*, UpAxis*, Vec3d*, Keyed<double>*, Keyed<Vec3d>*,
                  std::vector<Vec3d>*, std::vector<Index>*, Eigen::AngleAxisd*, std::array<unsigned, 2>*,
-                 SceneBackground*, std::optional<double>*, std::optional<std::size_t>*, std::optional<Index>*,
-                 std::optional<Vec3d>*, std::optional<Vec3f>*, std::optional<Box>*, std::optional<Ball>*,
-                 std::optional<SceneRepeat>*>;
+                 std::array<double, 2>*, SceneBackground*, std::optional<double>*, std::optional<std::size_t>*,
+                 std::optional<Index>*, std::optional<Vec3d>*, std::optional<Vec3f>*, std::optional<Box>*,
+                 std::optional<Ball>*, std::optional<SceneRepeat>*>;
 
 /// What a value may be; by default anything of its type.
 struct KeyValues {

@@ -26,6 +26,7 @@ std::string type_text(const std::vector<Vec3d>*) { return "three numbers, or a l
 std::string type_text(const std::vector<Index>*) { return "list of numbers from 0"; }
 std::string type_text(const Eigen::AngleAxisd*) { return "axis and degrees"; }
 std::string type_text(const std::array<unsigned, 2>*) { return "two whole numbers"; }
+std::string type_text(const std::array<double, 2>*) { return "two numbers"; }
 std::string type_text(const SceneBackground*) { return "text"; }
 std::string type_text(const Box*) { return "box"; }
 std::string type_text(const Ball*) { return "ball"; }
@@ -51,6 +52,9 @@ std::string spelled(const SceneKey& key, const T& value) {
 std::string spelled(const SceneKey&, const std::string& value) { return value; }
 std::string spelled(const SceneKey&, const Vec3d& value) { return fmt::format("[{}]", fmt::join(value, ", ")); }
 std::string spelled(const SceneKey&, const std::array<unsigned, 2>& value) {
+    return fmt::format("[{}]", fmt::join(value, ", "));
+}
+std::string spelled(const SceneKey&, const std::array<double, 2>& value) {
     return fmt::format("[{}]", fmt::join(value, ", "));
 }
 template <class T>

@@ -127,6 +127,11 @@ public:
         if (!list || list->size() != 2) wrong(node, "two whole numbers");
         for (std::size_t k = 0; k < 2; ++k) set(*list->get(k), value[k]);
     }
+    void set(const toml::node& node, std::array<double, 2>& value) const {
+        const toml::array* list = node.as_array();
+        if (!list || list->size() != 2) wrong(node, "two numbers");
+        for (std::size_t k = 0; k < 2; ++k) set(*list->get(k), value[k]);
+    }
     void set(const toml::node& node, SceneBackground& value) const {
         const std::string colors = text_of(node);
         const std::size_t comma = colors.find(',');

@@ -10,6 +10,7 @@
 #include "filigree/mesh/closest_point.h"
 #include "filigree/physics/body/own_weight.h"
 #include "filigree/physics/grid/grid_limits.h"
+#include "filigree/scene/mesh_map.h"
 #include "filigree/scene/particles_near.h"
 
 #include <algorithm>
@@ -158,9 +159,11 @@ private:
         body.origin = std::exchange(mesh.origin, Vec3d::Zero());
         hash_.add(mesh.positions);
         hash_.add(mesh.corners);
+        BodyOptions options = from.body;
+        options.fields = fields_of(from, mesh);
         body.body = at_line(scene_, from.line, [&] {
             return std::make_shared<const Body>(
-                make_body(mesh, from.material, from.body, context_, &body.report).value());
+                make_body(mesh, from.material, options, context_, &body.report).value());
         });
         body.scale = body.body->scale;
         if (!body.report.warning.empty()) warn(called(from) + ": " + body.report.warning);
@@ -174,6 +177,21 @@ private:
             warn(fmt::format("{}: {} (stripped with base {} and max_edge {:.2g}).", called(from), coarse->sentence(),
                              coarse->base, coarse->max_edge));
         return body;
+    }
+
+    /// What the maps say of a body by its mesh.
+    std::vector<VertexField> fields_of(const SceneBody& from, const Mesh& mesh) {
+        std::vector<VertexField> fields;
+        const auto number = std::size_t(&from - scene_.bodies.data());
+        for (const SceneMap& map : scene_.maps) {
+            if (map.body != number) continue;
+            VertexField& field = fields.emplace_back();
+            field.of = map.of;
+            field.values = at_line(scene_, map.line,
+                                   [&] { return in_range(mesh_map(mesh, map.from).value(), map.values, map.range); });
+            hash_.add(field.values);
+        }
+        return fields;
     }
 
     static std::string called(const SceneBody& body) {
