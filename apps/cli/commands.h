@@ -25,6 +25,7 @@ Command drop_command();
 Command sweep_command();
 Command export_command();
 Command fit_command();
+Command flesh_command();
 Command figures_command();
 /// Those of them that do nothing but draw: none in a program that is built without the renderer.
 std::vector<Command> drawing_commands();
@@ -34,7 +35,7 @@ inline std::vector<Command> all_commands() {
                                      level_command(),  deform_command(), restore_command(),  compare_command(),
                                      bench_command(),  demo_command(),   sample_command(),   simulate_command(),
                                      drop_command(),   export_command(), fracture_command(), pack_command(),
-                                     unpack_command(), sweep_command(),  fit_command()};
+                                     unpack_command(), sweep_command(),  fit_command(),      flesh_command()};
     for (Command& command : drawing_commands()) commands.push_back(std::move(command));
     return commands;
 }

@@ -72,6 +72,30 @@ struct MatterParticles {
 };
 
 // ---------------------------------------------------------------------------------------------------------------------
+// Targets of an animation
+
+/// How the particles of a body follow targets (Simulation::set_follow). Each particle is pulled to its target by a
+/// damped spring. No spring shortens the substep: one that is too stiff for it is as stiff as the substep allows.
+struct Follow {
+    /// Hz, one a particle: of the spring between a particle and its target. 0: no spring. Infinite: the particle is
+    /// held on its target.
+    std::vector<float> frequency;
+    /// 1/s, 0 or more, one a particle or one for all: rate at which a particle loses its speed beside the target's.
+    std::vector<float> damping = {3};
+    /// m, above 0, one a particle or one for all: further away from its target a particle is pulled harder, with
+    /// leash_frequency from twice this distance on. Infinite: no leash. Empty: two spacings.
+    std::vector<float> leash = {};
+    double leash_frequency = 20; ///< Hz, 0 or more
+    /// m/s^2, above 0: particles feel no more of their target's acceleration. The rest moves them with their target.
+    double most_acceleration = 100;
+};
+
+/// Velocities of targets in m/s, from their places in three frames: the mean of both differences, no longer than three
+/// times the shorter one, so that the cubic curve through the places overshoots nowhere [Fritsch and Carlson 1980].
+/// All three have the same size. frames_per_second: above 0. Cost O(particles).
+Vectors target_velocities(const Vectors& before, const Vectors& now, const Vectors& after, double frames_per_second);
+
+// ---------------------------------------------------------------------------------------------------------------------
 // The simulation
 
 /// A body and how it starts.
@@ -210,6 +234,21 @@ public:
     /// Errors: usage (no such body, another number of particles, a force that is not finite).
     Status set_forces(std::size_t body, const Vectors& newtons);
 
+    /// Lets a body follow targets, from now on. positions (m, world) and velocities (m/s): where the targets are now
+    /// and how they move. Particles stay where they are; set_positions puts them on the targets. A Follow without
+    /// frequency lets the body go. The state of the targets is part of save(), the Follow is not: before restore() call
+    /// this again as it was called before save(). Errors: usage (no such body; a body that is rigid, breaks or is of
+    /// mpm; lists of another length; a number out of range).
+    Status set_follow(std::size_t body, Follow follow, const Vectors& positions, const Vectors& velocities);
+    /// Says where the targets of a body are at the end of the next frame. Within the frame they move along a cubic
+    /// curve. Without this call they stop where they are. A way that is too long for the velocities (a teleport, a turn
+    /// within a frame) is not travelled: the particles are put where their targets jump to, as far as they jump.
+    /// positions: m. velocities: m/s, as target_velocities makes them. accelerations: m/s^2, what particles feel during
+    /// the frame in addition to gravity; or empty. Cost O(particles). Errors: usage (no such body; it does not follow;
+    /// another number of particles; a number that is not finite).
+    Status set_targets(std::size_t body, const Vectors& positions, const Vectors& velocities,
+                       const Vectors& accelerations = {});
+
     /// Replace the air and the heat sources of the world, which bodies of mpm feel. Errors: usage (what check_air and
     /// check_heat_sources refuse); the old values then stay.
     Status set_air(const Keyed<double>& temperature, double heat_transfer);
@@ -298,6 +337,7 @@ private:
     std::size_t attach_on_grid(std::size_t body, std::span<const Vec3f> points,
                                const RunContext& context = RunContext());
     Status check_vectors(std::size_t body, const Vectors& vectors, const char* what) const;
+    Status check_finite(std::size_t body, const Vectors& vectors, const char* what) const;
     std::unique_ptr<SimulationState> state_;
 };
 

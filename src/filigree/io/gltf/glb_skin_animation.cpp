@@ -111,14 +111,14 @@ public:
     }
 
     /// The animation, or null when nothing moves.
-    Json finish() {
+    Json finish(const std::string& name) {
         if (channels_.empty()) return nullptr;
         if (!held_.empty()) {
             const float zero = 0;
             const std::size_t moment = builder_.add_scalars(std::span(&zero, 1), GltfTarget::none, true);
             for (const std::size_t sampler : held_) samplers_[sampler]["input"] = moment;
         }
-        return {{"name", "driver"}, {"channels", std::move(channels_)}, {"samplers", std::move(samplers_)}};
+        return {{"name", name}, {"channels", std::move(channels_)}, {"samplers", std::move(samplers_)}};
     }
 
 private:
@@ -231,8 +231,8 @@ std::vector<double> SkinAnimation::key_times() const {
     return times;
 }
 
-GlbBuilder::Json SkinAnimation::add_to(GlbBuilder& builder, const Skin& skin, std::size_t first_node,
-                                       const RunContext& context) const {
+GlbBuilder::Json SkinAnimation::add_to(GlbBuilder& builder, const std::string& name, const Skin& skin,
+                                       std::size_t first_node, const RunContext& context) const {
     std::vector<std::vector<NestedRotations>> parts(skin.joints.size());
     parallel_for(context, parts.size(), 16, [&](std::size_t begin, std::size_t end) {
         for (std::size_t j = begin; j < end; ++j) {
@@ -246,7 +246,7 @@ GlbBuilder::Json SkinAnimation::add_to(GlbBuilder& builder, const Skin& skin, st
     for (std::size_t j = 0; j < parts.size(); ++j)
         for (const Track& track : make_tracks(parts[j], translations_[j], skin.rest[j], skin.gradient_scale()))
             channels.add(track, first_node + 2 * j + (track.inner ? 1 : 0));
-    return channels.finish();
+    return channels.finish(name);
 }
 
 } // namespace filigree

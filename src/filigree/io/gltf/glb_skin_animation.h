@@ -7,6 +7,7 @@
 #include "filigree/restore.h"
 
 #include <array>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -31,10 +32,10 @@ public:
     /// 95th percentile over driver vertices and keys of ExportReport::normal_error_degrees.
     double normal_error_degrees() const { return normal_error_degrees_; }
 
-    /// Adds the keys to a file where joint j has the outer node first_node + 2 j and the inner node after it. Returns
-    /// the animation, null when nothing moves. A property that stays at rest has no channel; one that stays elsewhere
-    /// has one key.
-    GlbBuilder::Json add_to(GlbBuilder& builder, const Skin& skin, std::size_t first_node,
+    /// Adds the keys, as an animation of that name, to a file where joint j has the outer node first_node + 2 j and the
+    /// inner node after it. Returns the animation, null when nothing moves. A property that stays at rest has no
+    /// channel; one that stays elsewhere has one key.
+    GlbBuilder::Json add_to(GlbBuilder& builder, const std::string& name, const Skin& skin, std::size_t first_node,
                             const RunContext& context) const;
 
 private:

@@ -88,8 +88,9 @@ std::filesystem::path folder_of(const std::string& name) {
     return folder.empty() ? "." : folder;
 }
 
-/// All of it, into `scene`. The bytes must stay.
-Status read_scene(std::string_view bytes, gltf::Scene& scene, const RunContext& context) {
+} // namespace
+
+Status gltf::read_scene(std::string_view bytes, Scene& scene, const RunContext& context) {
     try {
         if (bytes.starts_with(kByteOrderMark)) bytes.remove_prefix(kByteOrderMark.size());
         if (context.is_cancelled()) return cancelled_error();
@@ -115,8 +116,6 @@ Status read_scene(std::string_view bytes, gltf::Scene& scene, const RunContext& 
     return Success{};
 }
 
-} // namespace
-
 struct GltfScene::Scene : gltf::Scene {};
 
 GltfScene::GltfScene(std::unique_ptr<Scene> scene) : scene_(std::move(scene)) {}
@@ -134,14 +133,14 @@ Result<GltfScene> GltfScene::read(std::string bytes, const std::string& name, co
     auto scene = std::make_unique<Scene>();
     scene->name = name;
     scene->owned = std::move(bytes);
-    if (Status read = read_scene(scene->owned, *scene, context); !read) return read.error();
+    if (Status read = gltf::read_scene(scene->owned, *scene, context); !read) return read.error();
     return GltfScene(std::move(scene));
 }
 
 Result<GltfScene> GltfScene::read_view(std::string_view bytes, const std::string& name, const RunContext& context) {
     auto scene = std::make_unique<Scene>();
     scene->name = name;
-    if (Status read = read_scene(bytes, *scene, context); !read) return read.error();
+    if (Status read = gltf::read_scene(bytes, *scene, context); !read) return read.error();
     return GltfScene(std::move(scene));
 }
 
@@ -200,7 +199,7 @@ bool is_gltf(std::string_view bytes) {
 Result<MeshFile> read_gltf(const MeshSource& source) {
     gltf::Scene scene;
     scene.name = source.name;
-    if (Status read = read_scene(source.bytes, scene, source.context); !read) return read.error();
+    if (Status read = gltf::read_scene(source.bytes, scene, source.context); !read) return read.error();
     return MeshFile{std::move(scene.mesh), std::move(scene.warnings)};
 }
 

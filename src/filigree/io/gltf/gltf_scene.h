@@ -137,6 +137,9 @@ struct Scene {
     std::string export_report;
 };
 
+/// All of a file, into `scene`, which has its name. The bytes must stay. Errors: those of GltfScene::read_view.
+Status read_scene(std::string_view bytes, Scene& scene, const RunContext& context);
+
 /// Reads all of it but the places of the mesh's vertices. Throws Damage.
 void read_nodes(Scene& scene);
 void read_skins(Scene& scene);

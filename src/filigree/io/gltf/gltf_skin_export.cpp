@@ -9,6 +9,7 @@
 #include "filigree/io/mesh/losses.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/restore.h"
+#include "filigree/skin.h"
 
 #include <algorithm>
 #include <cmath>
@@ -87,9 +88,9 @@ void add_influences(GlbBuilder& builder, const GlbParts& parts, const Skin& skin
 /// Puts one skinned file together.
 class SkinExport {
 public:
-    SkinExport(const Model& model, const FrameSource<Pose>& poses, const SkinOptions& options,
+    SkinExport(const Model& model, std::span<const NamedPoses> clips, const SkinOptions& options,
                const RunContext& context)
-        : model_(model), poses_(poses), options_(options), context_(context), levels_(model, options.materials_beside) {
+        : model_(model), clips_(clips), options_(options), context_(context), levels_(model, options.materials_beside) {
     }
 
     Result<ExportReport> write(const std::filesystem::path& path) {
@@ -97,8 +98,6 @@ public:
         const unsigned level = restored_level(model_, options_.restore).value();
         Result<Restorer> restorer = Restorer::create(model_, options_.restore, context_);
         if (!restorer) return restorer.error();
-        PoseSampler poses(poses_, [&](const Pose& pose) { return check_pose(model_, pose); });
-
         if (options_.compress) builder_.round_positions();
         Skin skin;
         for (unsigned k = level + 1; k-- > 0;) {
@@ -114,18 +113,25 @@ public:
             return Error{ErrorCode::unsuitable,
                          "The driver would need " + std::to_string(skin.joints.size()) +
                              " joints, and glTF counts to 65536; use a model with a smaller driver."};
-        const Result<SkinAnimation> animation =
-            SkinAnimation::sample(skin, poses_, poses, *restorer, options_, context_);
-        if (!animation) return animation.error();
-        add_joints(skin, *animation);
-        const std::vector<double> keys = animation->key_times();
-
+        std::vector<Played> played;
+        for (const NamedPoses& clip : clips_) {
+            PoseSampler poses(clip.poses, [&](const Pose& pose) { return check_pose(model_, pose); });
+            Result<SkinAnimation> animation =
+                SkinAnimation::sample(skin, clip.poses, poses, *restorer, options_, context_);
+            if (!animation) return animation.error();
+            played.push_back({clip, *std::move(animation), std::move(poses)});
+        }
+        add_joints(skin, played);
         report_.vertices = skin.positions.size();
         report_.joints = skin.joints.size();
-        report_.keys = keys.size();
-        report_.seconds = keys.back();
-        report_.normal_error_degrees = animation->normal_error_degrees();
-        if (Status measured = measure(keys, poses, *restorer); !measured) return measured.error();
+        for (const Played& clip : played) {
+            const std::vector<double> keys = clip.animation.key_times();
+            report_.keys += keys.size();
+            report_.seconds += keys.back();
+            report_.normal_error_degrees =
+                std::max(report_.normal_error_degrees, clip.animation.normal_error_degrees());
+        }
+        if (Status measured = measure(played, *restorer); !measured) return measured.error();
         builder_.json["asset"] = {{"extras", {{"filigree", report_json()}}}};
         if (options_.compress)
             if (Status packed = builder_.compress(); !packed) return packed.error();
@@ -135,8 +141,16 @@ public:
     }
 
 private:
+    /// One animation of the file.
+    struct Played {
+        const NamedPoses& clip;
+        SkinAnimation animation;
+        PoseSampler poses;
+        std::optional<std::size_t> number = {}; ///< in the file; none: nothing moves in it
+    };
+
     const Model& model_;
-    const FrameSource<Pose>& poses_;
+    std::span<const NamedPoses> clips_;
     const SkinOptions& options_;
     const RunContext& context_;
     GlbBuilder builder_;
@@ -147,10 +161,15 @@ private:
     ExportReport report_;
 
     Status check() const {
-        if (poses_.frames == 0)
+        if (clips_.empty() ||
+            std::ranges::any_of(clips_, [](const NamedPoses& clip) { return clip.poses.frames == 0; }))
             return Error{ErrorCode::unsuitable,
                          "There are no poses to export; give the model some, by a simulation or from another "
                          "program."};
+        for (std::size_t c = 0; c < clips_.size(); ++c)
+            for (std::size_t other = 0; other < c; ++other)
+                if (clips_[other].name == clips_[c].name)
+                    return Error{ErrorCode::usage, "Two animations are called '" + clips_[c].name + "'."};
         if (options_.influences != 3 && options_.influences != 6)
             return Error{ErrorCode::usage,
                          "A vertex of a skin has 3 or 6 influences, not " + std::to_string(options_.influences) + "."};
@@ -191,7 +210,7 @@ private:
         level_nodes_.push_back(nodes_.size() - 1);
         return Success{};
     }
-    void add_joints(const Skin& skin, const SkinAnimation& animation) {
+    void add_joints(const Skin& skin, std::span<Played> played) {
         if (level_nodes_.size() > 1) {
             nodes_[0]["extensions"] = {
                 {"MSFT_lod", {{"ids", std::vector<std::size_t>(level_nodes_.begin() + 1, level_nodes_.end())}}}};
@@ -221,8 +240,14 @@ private:
             inverse_binds.push_back(Eigen::Matrix4f::Identity());
             inverse_binds.back().topRightCorner<3, 1>() = -skin.rest[j].cast<float>();
         }
-        if (Json moves = animation.add_to(builder_, skin, first_joint, context_); !moves.is_null())
-            builder_.json["animations"] = Json::array({moves});
+        Json animations = Json::array();
+        for (Played& clip : played) {
+            Json moves = clip.animation.add_to(builder_, clip.clip.name, skin, first_joint, context_);
+            if (moves.is_null()) continue;
+            clip.number = animations.size();
+            animations.push_back(std::move(moves));
+        }
+        if (!animations.empty()) builder_.json["animations"] = std::move(animations);
         const std::size_t binds = builder_.add({.type = "MAT4", .count = inverse_binds.size()},
                                                bytes_of(std::span<const Eigen::Matrix4f>(inverse_binds)));
         builder_.json["skins"] =
@@ -235,41 +260,63 @@ private:
         if (!lost_.empty()) report_.warnings.push_back(cannot_hold("A skinned GLB", lost_));
     }
 
-    /// Reads the file's own bytes and holds them against our restore.
-    Status measure(std::span<const double> keys, PoseSampler& poses, const Restorer& restorer) {
+    /// Reads the file's own bytes and holds them against our restore: the worst of all animations.
+    Status measure(std::span<Played> clips, const Restorer& restorer) {
         const Result<std::string_view> bytes = builder_.gather(); // without a copy, as they may be gigabytes
         if (!bytes) return bytes.error();
         const Result<GltfScene> scene = GltfScene::read_view(*bytes, "the exported GLB", context_);
         if (!scene) return scene.error();
         const Vec3d shift = scene->mesh().origin - model_.mesh.origin;
-        const bool moves = !scene->animations().empty();
         std::vector<Vec3f> rest = scene->mesh().positions;
-        const auto played = [&](double seconds, std::span<Vec3f> out) -> Status {
-            if (!moves) std::copy(rest.begin(), rest.end(), out.begin());
-            if (moves)
-                if (Status s = scene->positions(0, seconds, out, context_); !s) return s;
-            if (!shift.isZero(0))
-                for (Vec3f& p : out) p = (p.cast<double>() + shift).cast<float>();
-            return Success{};
-        };
-        const auto restored = [&](double seconds, std::span<Vec3f> out) -> Status {
-            const Result<Pose> pose = poses.at(seconds);
-            if (!pose) return pose.error();
-            return restorer.positions(*pose, out, context_);
-        };
-        return measure_animation(played, scene->mesh().vertex_count(), restored, restorer.vertex_count(), keys,
-                                 poses_.frames_per_second, report_, context_);
+        for (Played& clip : clips) {
+            const auto played = [&](double seconds, std::span<Vec3f> out) -> Status {
+                if (!clip.number) std::copy(rest.begin(), rest.end(), out.begin());
+                if (clip.number)
+                    if (Status s = scene->positions(*clip.number, seconds, out, context_); !s) return s;
+                if (!shift.isZero(0))
+                    for (Vec3f& p : out) p = (p.cast<double>() + shift).cast<float>();
+                return Success{};
+            };
+            const auto restored = [&](double seconds, std::span<Vec3f> out) -> Status {
+                const Result<Pose> pose = clip.poses.at(seconds);
+                if (!pose) return pose.error();
+                return restorer.positions(*pose, out, context_);
+            };
+            ExportReport of;
+            if (Status s =
+                    measure_animation(played, scene->mesh().vertex_count(), restored, restorer.vertex_count(),
+                                      clip.animation.key_times(), clip.clip.poses.frames_per_second, of, context_);
+                !s)
+                return s;
+            for (double ExportReport::*error : {&ExportReport::error_at_keys, &ExportReport::error_between_keys,
+                                                &ExportReport::rms_at_keys, &ExportReport::rms_between_keys})
+                report_.*error = std::max(report_.*error, of.*error);
+            report_.moments += of.moments;
+            report_.moments_checked += of.moments_checked;
+        }
+        return Success{};
     }
 
     Json report_json() const {
+        Json report = report_of_all();
+        if (clips_.size() > 1)
+            for (const NamedPoses& clip : clips_) report["clips"].push_back(clip.name);
+        return report;
+    }
+    std::size_t frame_count() const {
+        std::size_t count = 0;
+        for (const NamedPoses& clip : clips_) count += clip.poses.frames;
+        return count;
+    }
+    Json report_of_all() const {
         return {{"export", "skin"},
                 {"influences", options_.influences},
                 {"interpolation", options_.interpolation == KeyInterpolation::cubic ? "cubic" : "linear"},
                 {"vertices", report_.vertices},
                 {"joints", report_.joints},
                 {"keys", report_.keys},
-                {"frames", poses_.frames},
-                {"frames_per_second", poses_.frames_per_second},
+                {"frames", frame_count()},
+                {"frames_per_second", clips_.front().poses.frames_per_second},
                 {"seconds", report_.seconds},
                 {"error_at_keys", report_.error_at_keys},
                 {"rms_at_keys", report_.rms_at_keys},
@@ -283,13 +330,20 @@ private:
 
 } // namespace
 
-Result<ExportReport> write_skin_glb(const Model& model, const FrameSource<Pose>& poses, const SkinOptions& options,
-                                    const std::filesystem::path& path, const RunContext& context) {
+Result<ExportReport> write_skin_glb(const Model& model, std::span<const NamedPoses> animations,
+                                    const SkinOptions& options, const std::filesystem::path& path,
+                                    const RunContext& context) {
     try {
-        return SkinExport(model, poses, options, context).write(path);
+        return SkinExport(model, animations, options, context).write(path);
     } catch (const std::bad_alloc&) {
         return Error{ErrorCode::out_of_memory, path.string() + ": does not fit into memory; export fewer keys."};
     }
+}
+
+Result<ExportReport> write_skin_glb(const Model& model, const FrameSource<Pose>& poses, const SkinOptions& options,
+                                    const std::filesystem::path& path, const RunContext& context) {
+    const NamedPoses driver{"driver", poses};
+    return write_skin_glb(model, std::span(&driver, 1), options, path, context);
 }
 
 } // namespace filigree

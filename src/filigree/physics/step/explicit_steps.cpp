@@ -227,10 +227,12 @@ private:
             if (vibrations_[b].elastic.size() > 0) debts_[b].begin(body, vibrations_[b].elastic, context_);
         });
         kick(0.5f * dt, false);
+        pull_to_targets(state_, now_, dt, context_);
         move_rigid(double(dt));
         drift(dt);
         const double before = std::exchange(now_, until);
         move_pins(state_, now_, dt);
+        hold_on_targets(state_, now_);
         make_way(state_, before, now_);
         if (meets_anything_) state_.contacts.travel(bodies_, dt, before, now_, context_);
     }
@@ -420,6 +422,7 @@ private:
             state_.contacts.events().keep_forces();
         }
         const Stopwatch watch(report_.other_seconds);
+        pull_to_targets(state_, now_, dt, context_);
         kick(0.5f * dt, true);
         each_elastic([&](BodyState& body, std::size_t b) {
             if (debts_[b].has_begun()) debts_[b].end(body, context_);
@@ -430,6 +433,7 @@ private:
             place_particles(body);
         });
         move_pins(state_, now_, dt);
+        hold_on_targets(state_, now_);
         finish_substep(state_, dt, context_);
         ++report_.substeps;
     }

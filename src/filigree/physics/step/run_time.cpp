@@ -169,6 +169,7 @@ void remove_body(SimulationState& state, std::size_t actor) {
     const std::size_t first_piece = body.first_piece, pieces = body.broken ? body.broken->pieces.size() : 0;
     end_attachments(state, slot);
     end_holds(state, actor);
+    std::erase_if(state.targets, [&](const Targets& targets) { return targets.memory.actor == actor; });
     state.grid->remove(actor);
     std::erase_if(state.cracks, [&](const Cracks& cracks) { return cracks.whole() == slot; });
     for (std::size_t piece = 0; piece < pieces; ++piece) free_one(state, first_piece + piece);

@@ -2,6 +2,8 @@
 
 #include "filigree/physics/step/byte_stream.h"
 
+#include <array>
+
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
@@ -11,7 +13,8 @@ namespace {
 
 // The name of the format, its version last. C: contacts are pairs of one kind; obstacles that were set, and what
 // touched in the last frame.
-constexpr std::uint64_t kMagic = 0x43455441'54534c46; // "FLSTATEC"
+constexpr std::uint64_t kMagic = 0x43455441'54534c46;            // "FLSTATEC"
+constexpr std::uint64_t kMagicWithTargets = 0x46455441'54534c46; // "FLSTATEF": bodies follow targets
 static_assert(sizeof(SetMotion) == sizeof(std::uint64_t) + 26 * sizeof(double), "padding would be saved");
 static_assert(sizeof(ContactEvents::PairMemory) == 2 * sizeof(std::uint64_t) + 2 * sizeof(Index) + 2 * sizeof(Vec3f),
               "padding would be saved");
@@ -108,11 +111,43 @@ Contacts::Memory read_contacts(ByteReader& reader) {
     return contacts;
 }
 
+template <class Memory>
+auto vectors_of(Memory& targets) {
+    return std::array{&targets.from, &targets.from_velocities, &targets.to, &targets.to_velocities,
+                      &targets.accelerations};
+}
+
+void write_targets(ByteWriter& writer, std::span<const TargetsMemory> targets) {
+    writer.value(std::uint64_t(targets.size()));
+    for (const TargetsMemory& of : targets) {
+        writer.value(of.actor);
+        writer.value(of.is_set);
+        for (const Vectors* vectors : vectors_of(of)) {
+            writer.value(std::uint64_t(vectors->size()));
+            writer.vectors(*vectors);
+        }
+    }
+}
+
+std::vector<TargetsMemory> read_targets(ByteReader& reader) {
+    std::vector<TargetsMemory> targets(reader.count(7 * sizeof(std::uint64_t)));
+    for (TargetsMemory& of : targets) {
+        of.actor = reader.value<std::uint64_t>();
+        of.is_set = reader.value<std::uint64_t>();
+        for (Vectors* vectors : vectors_of(of)) {
+            const std::size_t count = reader.count(3 * sizeof(float));
+            Vectors read = reader.vectors(count);
+            if (count > 0) *vectors = std::move(read);
+        }
+    }
+    return targets;
+}
+
 } // namespace
 
 std::string write_saved_state(const SavedState& state) {
     ByteWriter writer;
-    writer.value(kMagic);
+    writer.value(state.targets.empty() ? kMagic : kMagicWithTargets);
     for (const std::uint64_t hash : {state.made_for.bodies, state.made_for.world, state.made_for.options})
         writer.value(hash);
     writer.value(state.frame);
@@ -123,6 +158,7 @@ std::string write_saved_state(const SavedState& state) {
     writer.array(std::span(state.rigid_pairs.pairs));
     writer.array(std::span(state.rigid_pairs.points));
     writer.array(std::span(state.grid));
+    if (!state.targets.empty()) write_targets(writer, state.targets);
     for (const CrackMemory& cracks : state.cracks) {
         writer.value(cracks.is_open);
         writer.array(std::span(cracks.links));
@@ -136,7 +172,8 @@ std::string write_saved_state(const SavedState& state) {
 
 Result<SavedState> read_saved_state(std::string_view bytes) {
     const Error damaged{ErrorCode::bad_file, "The saved state is damaged; start the simulation anew."};
-    if (ByteReader(bytes).value<std::uint64_t>() != kMagic)
+    const auto magic = ByteReader(bytes).value<std::uint64_t>();
+    if (magic != kMagic && magic != kMagicWithTargets)
         return Error{ErrorCode::bad_file,
                      "The saved state is damaged or of another version; start the simulation anew."};
     const std::string_view contents = bytes.substr(0, bytes.size() - sizeof(std::uint64_t));
@@ -156,6 +193,7 @@ Result<SavedState> read_saved_state(std::string_view bytes) {
     state.rigid_pairs.points = reader.array<RigidPairs::Point>();
     const std::vector<char> grid = reader.array<char>();
     state.grid.assign(grid.begin(), grid.end());
+    if (magic == kMagicWithTargets) state.targets = read_targets(reader);
     while (reader.ok() && !reader.at_end()) {
         CrackMemory& cracks = state.cracks.emplace_back();
         cracks.is_open = reader.value<std::uint32_t>();

@@ -6,6 +6,7 @@
 #include "filigree/physics/rigid/rigid_pairs.h"
 #include "filigree/physics/step/made_for.h"
 #include "filigree/physics/step/set_motion.h"
+#include "filigree/physics/step/targets.h"
 #include "filigree/result.h"
 
 #include <string>
@@ -28,8 +29,9 @@ struct SavedState {
     std::vector<SavedBody> bodies;
     Contacts::Memory contacts;
     RigidPairs::Memory rigid_pairs;
-    std::string grid;                ///< mpm::Bodies::state
-    std::vector<CrackMemory> cracks; ///< of bodies that break
+    std::string grid;                   ///< mpm::Bodies::state
+    std::vector<TargetsMemory> targets; ///< of bodies that follow
+    std::vector<CrackMemory> cracks;    ///< of bodies that break
 };
 
 /// Values and arrays end to end after the version's name; no padding, so that equal states are equal bytes.

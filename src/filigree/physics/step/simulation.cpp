@@ -120,6 +120,7 @@ Result<FrameReport> step_frame(SimulationState& state, const RunContext& context
     FrameReport report;
     state.contacts.clear_touches();
     state.contacts.events().begin_frame();
+    follow_jumps(state);
     state.external.find_wind(state.bodies, from, state.options.frames_per_second, context);
     std::size_t held = step_bodies(state, from, until, report, context);
     if (context.is_cancelled()) return cancelled_error();
@@ -132,6 +133,7 @@ Result<FrameReport> step_frame(SimulationState& state, const RunContext& context
     report.most_crushed = crushed.is_free() ? 0 : crushed.actor; // nothing was
     note_flow(state, report);
     for (const Cracks& cracks : state.cracks) cracks.show_whole(state.bodies);
+    for (Targets& targets : state.targets) targets.end_frame();
     let_rest(state, from, until);
     state.contacts.events().end_frame(state.bodies);
     ++state.frame;
@@ -263,6 +265,15 @@ Status Simulation::check_vectors(std::size_t body, const Vectors& vectors, const
     return Success{};
 }
 
+/// what: of one particle.
+Status Simulation::check_finite(std::size_t body, const Vectors& vectors, const char* what) const {
+    for (std::size_t i = 0; i < vectors.size(); ++i)
+        if (!vectors[i].allFinite())
+            return usage("The " + std::string(what) + (what == std::string_view("force") ? " on" : " of") +
+                         " particle " + std::to_string(i) + " of body " + std::to_string(body) + " is not finite.");
+    return Success{};
+}
+
 Status Simulation::set_hands(std::vector<Hand> hands, const RunContext& context) {
     if (Status checked = check_hands(hands, body_count()); !checked) return checked;
     for (const Hand& hand : hands)
@@ -277,11 +288,59 @@ Status Simulation::set_hands(std::vector<Hand> hands, const RunContext& context)
 Status Simulation::set_forces(std::size_t body, const Vectors& newtons) {
     if (Status checked = newtons.size() > 0 ? check_count(body, newtons, "forces") : check_body(body); !checked)
         return checked;
-    for (std::size_t i = 0; i < newtons.size(); ++i)
-        if (!newtons[i].allFinite())
-            return usage("The force on particle " + std::to_string(i) + " of body " + std::to_string(body) +
-                         " is not finite.");
+    if (Status checked = check_finite(body, newtons, "force"); !checked) return checked;
     state_->external.set_pushes(state_->slot_of[body], newtons);
+    return Success{};
+}
+
+Status Simulation::set_follow(std::size_t body, Follow follow, const Vectors& positions, const Vectors& velocities) {
+    if (Status checked = check_body(body); !checked) return checked;
+    std::vector<Targets>& targets = state_->targets;
+    const auto place = std::ranges::lower_bound(targets, body, {}, [](const Targets& t) { return t.memory.actor; });
+    const bool follows = place != targets.end() && place->memory.actor == body;
+    BodyState& state = state_->body_of(body);
+    if (follow.frequency.empty()) {
+        if (follows) targets.erase(place);
+        release_targets(*state_, state);
+        return Success{};
+    }
+    if (state.rigid || state.is_on_grid || state.broken)
+        return usage("Body " + std::to_string(body) +
+                     (state.rigid        ? " is rigid and has no particles that could follow targets; switch "
+                                           "automatic_rigid off or make it of more particles."
+                      : state.is_on_grid ? " is of the model mpm, which does not follow targets; make it of fem."
+                                         : " breaks, and bodies that break do not follow targets."));
+    if (Status checked = check_count(body, positions, "targets"); !checked) return checked;
+    if (Status checked = check_count(body, velocities, "target velocities"); !checked) return checked;
+    if (Status checked = check_finite(body, positions, "target"); !checked) return checked;
+    if (Status checked = check_finite(body, velocities, "target velocity"); !checked) return checked;
+    if (const std::string wrong = check_follow(follow, positions.size()); !wrong.empty()) return usage(wrong);
+    release_targets(*state_, state);
+    Targets made(body, std::move(follow), positions, velocities, state.body->spacing());
+    for (const Index i : made.held) {
+        state.fixed[i] = 1;
+        state.inverse_mass[i] = 0;
+    }
+    if (follows)
+        *place = std::move(made);
+    else
+        targets.insert(place, std::move(made));
+    return Success{};
+}
+
+Status Simulation::set_targets(std::size_t body, const Vectors& positions, const Vectors& velocities,
+                               const Vectors& accelerations) {
+    if (Status checked = check_count(body, positions, "targets"); !checked) return checked;
+    if (Status checked = check_count(body, velocities, "target velocities"); !checked) return checked;
+    if (accelerations.size() > 0)
+        if (Status checked = check_count(body, accelerations, "accelerations"); !checked) return checked;
+    if (Status checked = check_finite(body, positions, "target"); !checked) return checked;
+    if (Status checked = check_finite(body, velocities, "target velocity"); !checked) return checked;
+    if (Status checked = check_finite(body, accelerations, "acceleration"); !checked) return checked;
+    const auto found = std::ranges::find(state_->targets, body, [](const Targets& t) { return t.memory.actor; });
+    if (found == state_->targets.end())
+        return usage("Body " + std::to_string(body) + " follows no targets; call set_follow first.");
+    found->set(positions, velocities, accelerations);
     return Success{};
 }
 

@@ -37,6 +37,15 @@ bool is_sound(const ContactEvents::PairMemory& pair, const SimulationState& stat
     return pair.body < actors && pair.other < others && pair.place.allFinite() && pair.normal.allFinite();
 }
 
+/// False where they are of other bodies, or no targets.
+bool restore_targets(SimulationState& state, std::vector<TargetsMemory>& saved) {
+    if (saved.size() != state.targets.size()) return false;
+    for (std::size_t t = 0; t < saved.size(); ++t)
+        if (!state.targets[t].takes(saved[t])) return false;
+    for (std::size_t t = 0; t < saved.size(); ++t) state.targets[t].memory = std::move(saved[t]);
+    return true;
+}
+
 /// Those that were not set go as the world was made.
 bool restore_obstacles(SimulationState& state, const std::vector<SetMotion>& saved) {
     const auto sound = [&](const SetMotion& set) { return is_sound(set, state.world.obstacles.size()); };
@@ -66,6 +75,7 @@ SavedState save_state(const SimulationState& state) {
     saved.contacts = state.contacts.memory();
     saved.rigid_pairs = state.rigid_pairs.memory();
     saved.grid = state.grid->state();
+    for (const Targets& targets : state.targets) saved.targets.push_back(targets.memory);
     for (const Cracks& cracks : state.cracks) saved.cracks.push_back(cracks.memory());
     return saved;
 }
@@ -76,6 +86,9 @@ Status restore_state(SimulationState& state, SavedState saved) {
         ErrorCode::mismatch,
         "The saved state is of other bodies; resume it with the bodies that there were when it was saved."};
     if (saved.bodies.size() != state.bodies.size() || saved.cracks.size() != state.cracks.size()) return other;
+    if (!restore_targets(state, saved.targets))
+        return Error{ErrorCode::mismatch, "The saved state is of bodies that follow other targets; let them follow as "
+                                          "they did when it was saved, then resume it."};
     for (std::size_t c = 0; c < saved.cracks.size(); ++c)
         if (!state.cracks[c].set_memory(saved.cracks[c], state.bodies)) return damaged;
     for (std::size_t b = 0; b < state.bodies.size(); ++b) {

@@ -11,7 +11,9 @@
 #include "filigree/physics/step/made_for.h"
 #include "filigree/physics/step/saved_state.h"
 #include "filigree/physics/step/set_motion.h"
+#include "filigree/physics/step/targets.h"
 
+#include <algorithm>
 #include <map>
 
 namespace filigree {
@@ -48,6 +50,7 @@ struct SimulationState {
     RigidPairs rigid_pairs;
     RigidContacts rigid_contacts; ///< room that is used again; nothing is remembered
     ExternalForces external;
+    std::vector<Targets> targets;           ///< of bodies that follow, ascending by actor
     std::unique_ptr<mpm::Bodies> grid;      ///< of bodies of mpm; never null
     std::vector<Attachment> attachments;    ///< of slots; of bodies that were removed kNobody
     std::vector<std::size_t> first_tracers; ///< of each attachment: its points on the grid, where it is of such a body
@@ -61,6 +64,7 @@ struct SimulationState {
     /// Whether a slot, which is not free, holds a piece of a body that breaks.
     bool is_piece(std::size_t slot) const { return slot_of[bodies[slot].actor] != slot; }
     BodyState& body_of(std::size_t actor) { return bodies[slot_of[actor]]; }
+    float part_of_frame(double now) const { return float(std::clamp((now - time()) / frame_seconds(), 0.0, 1.0)); }
     const BodyState& body_of(std::size_t actor) const; ///< of one that was removed: a free slot
     const Cracks* cracks_of(std::size_t slot) const;   ///< null: it does not break
 };
@@ -82,6 +86,12 @@ float least_spacing(std::span<const BodyState> bodies); ///< m
 /// Puts pinned particles where their motion has them at `now`, with its velocity; dt: of the substep, 0 at the start.
 /// Of bodies on the grid, or of the others.
 void move_pins(SimulationState& state, double now, float dt, bool on_grid = false);
+/// Targets that jump take their particles along, at the start of a frame.
+void follow_jumps(SimulationState& state);
+/// Half a kick by the springs to targets; dt: of the whole substep.
+void pull_to_targets(SimulationState& state, double now, float dt, const RunContext& context);
+/// Puts particles that are held where their targets are at `now`.
+void hold_on_targets(SimulationState& state, double now);
 /// Starts that no step can take: coincident particles are shaken apart, and what is stretched too far is scaled down.
 /// Whether anything was done.
 bool repair_start(SimulationState& state, std::span<const ElasticReport> elastic, FrameReport& report,

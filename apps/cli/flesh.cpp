@@ -1,0 +1,422 @@
+#include "animation_output.h"
+#include "commands.h"
+
+#include "filigree/fit.h"
+#include "filigree/flesh.h"
+#include "filigree/io/system/extension.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numeric>
+
+#include <fmt/format.h>
+
+namespace filigree::cli {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kDefaultKeyRate = 30; // a second
+constexpr double kFarFromSkin = 0.1;   // of the diagonal
+constexpr double kMuchOverlap = 1e-3;  // of the volume
+constexpr double kRestlessLoop = 5e-3; // of the diagonal
+constexpr double kAlreadyLoops = 0.01; // of the diagonal
+constexpr double kMuchVolumeLost = 0.95;
+constexpr std::size_t kOverlapFrames = 4;
+
+struct FleshArguments {
+    std::string input;
+    std::vector<std::string> outputs, clips, soft;
+    double strength = SoftJoints{}.strength;
+    FleshOptions flesh;
+    FleshClipOptions clip;
+    bool no_self_contact = false, sags = false, no_check = false;
+    std::size_t joints = 300;
+    AnimationOutput animation;
+};
+
+bool is_glb(const std::string& path) { return lower_extension(path) == ".glb"; }
+bool is_fil(const std::string& path) { return lower_extension(path) == ".fil"; }
+
+void check_outputs(const FleshArguments& options, const Session& session) {
+    for (std::size_t k = 0; k < options.outputs.size(); ++k) {
+        const std::string& path = options.outputs[k];
+        for (std::size_t before = 0; before < k; ++before)
+            if (options.outputs[before] == path) refuse(path + ": two outputs cannot go to one place.");
+        if (is_fil(path))
+            check_folder_of(path);
+        else
+            check_animation_path(path);
+        check_not_input(path, {options.input});
+    }
+    check_animation_options(options.outputs, session);
+    if (options.animation.glb == GlbMotion::morph)
+        refuse("--as morph is for meshes; flesh leaves as a skin. Write a .fil and export that.");
+}
+
+std::string list_of_clips(const SkinnedMesh& skin) {
+    std::string list;
+    for (const SkinClip& clip : skin.clips) list += (list.empty() ? "'" : ", '") + clip.name + "'";
+    return list;
+}
+
+/// The clips that --clip names, or all that move.
+std::vector<std::size_t> chosen_clips(const FleshArguments& options, const SkinnedMesh& skin, Session& session) {
+    std::vector<std::size_t> chosen;
+    for (const std::string& name : options.clips) {
+        const auto found = std::ranges::find(skin.clips, name, &SkinClip::name);
+        if (found == skin.clips.end())
+            refuse(fmt::format("{}: has no clip '{}', but {}.", options.input, name, list_of_clips(skin)));
+        const auto number = std::size_t(found - skin.clips.begin());
+        if (!(found->seconds > 0))
+            refuse(ErrorCode::unsuitable,
+                   fmt::format("{}: clip '{}' is a single pose and does not move.", options.input, name));
+        if (std::ranges::find(chosen, number) == chosen.end()) chosen.push_back(number);
+    }
+    if (!chosen.empty()) return chosen;
+    std::string poses;
+    for (std::size_t c = 0; c < skin.clips.size(); ++c) {
+        if (skin.clips[c].seconds > 0)
+            chosen.push_back(c);
+        else
+            poses += (poses.empty() ? "'" : ", '") + skin.clips[c].name + "'";
+    }
+    if (chosen.empty())
+        refuse(ErrorCode::unsuitable, options.input + ": its clips are single poses, and nothing moves.");
+    if (!poses.empty()) session.warn("Clips that are a single pose were left out: " + poses + ".");
+    return chosen;
+}
+
+/// Clips of one name get numbers.
+std::vector<std::string> names_of(const std::vector<FleshClip>& clips) {
+    std::vector<std::string> names;
+    for (const FleshClip& clip : clips) {
+        std::string name = clip.name;
+        for (int number = 2; std::ranges::find(names, name) != names.end(); ++number)
+            name = fmt::format("{} {}", clip.name, number);
+        names.push_back(std::move(name));
+    }
+    return names;
+}
+
+class FleshCommand {
+public:
+    FleshCommand(const FleshArguments& options, Session& session)
+        : options_(options), session_(session), flesh_(make_flesh()) {}
+
+    void run() {
+        const double start = now_seconds();
+        for (const std::size_t clip : clip_numbers_) {
+            clips_.push_back(require(simulate_flesh(flesh_, clip, clip_options(), session_.context())));
+            measures_.push_back(require(
+                measure_flesh(flesh_, clips_.back(), options_.no_check ? 0 : kOverlapFrames, session_.context())));
+        }
+        names_ = names_of(clips_);
+        const double simulated = now_seconds();
+        fit();
+        report_flesh();
+        for (std::size_t c = 0; c < clips_.size(); ++c) report_clip(c);
+        write();
+        report_.row("time", fmt::format("simulating {}, writing {}", seconds_text(simulated - start),
+                                        seconds_text(now_seconds() - simulated)));
+        report_.set("simulate_seconds", simulated - start);
+        advise();
+        session_.print(report_);
+        doubt();
+    }
+
+private:
+    Flesh make_flesh() {
+        check_outputs(options_, session_);
+        SkinnedMesh skin = require(read_skin(options_.input, session_.context()));
+        session_.warn(skin.warnings);
+        clip_numbers_ = chosen_clips(options_, skin, session_);
+        for (const std::string& path : options_.outputs)
+            if (!is_glb(path) && clip_numbers_.size() > 1)
+                refuse(fmt::format("{}: holds one clip, and {} has {}; name one with --clip, or write a .glb.", path,
+                                   options_.input, list_of_clips(skin)));
+        FleshOptions options = options_.flesh;
+        options.sculpted_gravity = !options_.sags;
+        for (const std::string& pattern : options_.soft) options.soft.push_back({pattern, options_.strength});
+        Result<Flesh> made = Flesh::create(std::move(skin), options, clip_numbers_, session_.context());
+        if (!made) throw Failure{{made.error().code, options_.input + ": " + made.error().message}};
+        session_.warn(made->report().warnings);
+        return std::move(*made);
+    }
+
+    FleshClipOptions clip_options() const {
+        FleshClipOptions options = options_.clip;
+        options.self_contact = !options_.no_self_contact;
+        return options;
+    }
+
+    /// The frames of all clips, one behind the other.
+    std::pair<std::size_t, std::size_t> clip_and_frame(std::size_t frame) const {
+        std::size_t clip = 0;
+        while (frame >= clips_[clip].frames.size()) frame -= clips_[clip++].frames.size();
+        return {clip, frame};
+    }
+
+    /// As few joints as were asked for, that follow the flesh best.
+    void fit() {
+        const Mesh& mesh = flesh_.skin().mesh;
+        std::vector<Index> all(mesh.vertex_count());
+        std::iota(all.begin(), all.end(), Index{0});
+        FleshCarrier carrier = require(FleshCarrier::create(flesh_, all, session_.silent_context()));
+        const RunContext silent = session_.silent_context();
+        MeshAnimation animation{.rest = &mesh, .positions = {}};
+        for (const FleshClip& clip : clips_) animation.frames += clip.frames.size();
+        animation.positions = [&](std::size_t frame, std::span<Vec3f> positions) -> Status {
+            const auto [clip, of_clip] = clip_and_frame(frame);
+            carrier.at(clips_[clip], of_clip, positions, {}, silent);
+            return Success{};
+        };
+        fitted_ = require(fit_animation(animation, {.base = options_.joints}, session_.context()));
+        std::size_t first = 0;
+        for (std::size_t c = 0; c < clips_.size(); ++c) {
+            PoseSequence& poses = poses_.emplace_back();
+            poses.frames_per_second = clips_[c].frames_per_second;
+            const auto begin = fitted_.poses.frames.begin() + std::ptrdiff_t(first);
+            poses.frames.assign(begin, begin + std::ptrdiff_t(clips_[c].frames.size()));
+            first += clips_[c].frames.size();
+            if (clips_[c].is_loop && !(flesh_gap(c) > 0)) poses.frames.back() = poses.frames.front();
+        }
+    }
+
+    /// m: how far the last frame is from the first.
+    double flesh_gap(std::size_t c) const {
+        const Vectors &first = clips_[c].frames.front(), &last = clips_[c].frames.back();
+        double most = 0;
+        for (std::size_t i = 0; i < first.size(); ++i) most = std::max(most, double((first[i] - last[i]).norm()));
+        return most;
+    }
+
+    void write() {
+        for (const std::string& path : options_.outputs) {
+            if (is_fil(path)) {
+                session_.write_model(fitted_.model, path, poses_[0]);
+                report_.row("file", path);
+                continue;
+            }
+            if (!is_glb(path)) {
+                Report of_file;
+                FrameSource<Pose> poses = frames_of(poses_[0]);
+                poses.metres_per_unit = flesh_.scale();
+                write_animation_output(fitted_.model, poses, {}, options_.animation, path, options_.input, session_,
+                                       of_file);
+                report_.add_rows(of_file);
+                continue;
+            }
+            std::vector<NamedPoses> named;
+            for (std::size_t c = 0; c < clips_.size(); ++c) named.push_back({names_[c], frames_of(poses_[c])});
+            SkinOptions skin = options_.animation.skin;
+            skin.normals = options_.animation.no_normals ? ExportNormals::leave : ExportNormals::keep;
+            skin.compress = options_.animation.compress;
+            skin.materials_beside = options_.input;
+            if (!skin.key_rate) skin.key_rate = kDefaultKeyRate;
+            session_.begin_writing(path);
+            const ExportReport written = require(write_skin_glb(fitted_.model, named, skin, path, session_.context()));
+            session_.warn(written.warnings);
+            report_.add("file",
+                        fmt::format("{}, {:.3g} MB: {} joints, {} clips, {} keys, error {:.1e} of the diagonal at them",
+                                    path, double(written.bytes) / 1e6, with_commas(written.joints), named.size(),
+                                    with_commas(written.keys), written.error_at_keys),
+                        "output", path);
+            report_.set("bytes", written.bytes);
+            report_.set("error_at_keys", written.error_at_keys);
+        }
+    }
+
+    void report_flesh() {
+        const FleshReport& made = flesh_.report();
+        const Body& body = *flesh_.body();
+        const double size = bounds(flesh_.skin().mesh).size().maxCoeff();
+        report_.add(
+            "size",
+            fmt::format("{:.3g} m: {:.3g} model units at {:.3g} m each", size * flesh_.scale(), size, flesh_.scale()),
+            "scale", flesh_.scale());
+        report_.add("flesh",
+                    fmt::format("{} particles, {:.2g} cm apart: {} held by bones, {} in thin parts",
+                                with_commas(body.particle_count()), 100 * body.spacing(), with_commas(made.held),
+                                with_commas(made.thin)),
+                    "particles", body.particle_count());
+        if (made.left_out_vertices > 0)
+            report_.row("left out", fmt::format("{} of {} vertices follow their joints without flesh",
+                                                with_commas(made.left_out_vertices),
+                                                with_commas(flesh_.skin().mesh.vertex_count())));
+        report_.set("spacing", body.spacing());
+        report_.set("held", made.held);
+        report_.set("left_out_vertices", made.left_out_vertices);
+        report_.add("joints",
+                    fmt::format("{}, which follow the flesh to {:.1e} of the diagonal (rms; worst {:.1e})",
+                                with_commas(fitted_.report.driver_vertices), fitted_.report.rms, fitted_.report.max),
+                    "joints", fitted_.report.driver_vertices);
+        report_.set("fit_rms", fitted_.report.rms);
+        report_.set("fit_max", fitted_.report.max);
+    }
+
+    void report_clip(std::size_t c) {
+        const FleshClip& clip = clips_[c];
+        const FleshMeasure& m = measures_[c];
+        const std::string& joint =
+            m.furthest_joint == kNoIndex ? names_[c] : flesh_.skin().joints[m.furthest_joint].name;
+        report_.row("clip", fmt::format("'{}', {} frames at {:.4g} a second, {} a frame, {} substeps at most",
+                                        names_[c], clip.frames.size(), clip.frames_per_second,
+                                        seconds_text(clip.step_seconds + clip.target_seconds), clip.most_substeps));
+        report_.row("  volume", fmt::format("{:.3f} .. {:.3f} of the bind pose's; the skin alone: {:.3f} .. {:.3f}",
+                                            m.least_volume, m.most_volume, m.skin_least_volume, m.skin_most_volume));
+        if (!options_.no_check)
+            report_.row("  overlap", fmt::format("{:.1e} of the volume; the skin alone: {:.1e}",
+                                                 std::max(0.0, m.overlap), std::max(0.0, m.skin_overlap)));
+        report_.row("  from the skin", fmt::format("{:.3f} of the diagonal at most, at '{}' in frame {}", m.furthest,
+                                                   joint, m.furthest_frame));
+        if (clip.is_loop)
+            report_.row("  loop", fmt::format("{:.1e} of the diagonal between cycles (worst {:.1e}) after {}, faded "
+                                              "to none",
+                                              clip.loop_rms, clip.loop_max, clip.cycles));
+        Json of = Json::object();
+        of["name"] = names_[c];
+        of["frames"] = clip.frames.size();
+        of["frames_per_second"] = clip.frames_per_second;
+        of["step_seconds"] = clip.step_seconds;
+        of["target_seconds"] = clip.target_seconds;
+        of["most_substeps"] = clip.most_substeps;
+        of["least_volume_ratio"] = clip.least_volume_ratio;
+        of["inverted_cells"] = clip.inverted_cells;
+        of["clamped_particles"] = clip.clamped_particles;
+        of["volume"] = {m.least_volume, m.most_volume};
+        of["skin_volume"] = {m.skin_least_volume, m.skin_most_volume};
+        of["overlap"] = m.overlap;
+        of["skin_overlap"] = m.skin_overlap;
+        of["furthest"] = m.furthest;
+        of["furthest_joint"] = joint;
+        of["is_loop"] = clip.is_loop;
+        of["loop_rms"] = clip.loop_rms;
+        of["loop_max"] = clip.loop_max;
+        of["cycles"] = clip.cycles;
+        report_.set("clips").push_back(std::move(of));
+    }
+
+    /// What a user would change.
+    void advise() {
+        for (std::size_t c = 0; c < clips_.size(); ++c) {
+            const FleshClip& clip = clips_[c];
+            const FleshMeasure& m = measures_[c];
+            const std::string of = "Clip '" + names_[c] + "': ";
+            if (!clip.is_loop && !options_.clip.loop && clip.skin_gap < kAlreadyLoops)
+                session_.warn(of + "it ends as it begins; with --loop its flesh does so too.");
+            if (clip.is_loop && clip.loop_rms > kRestlessLoop)
+                session_.warn(of + "the flesh does not settle into a cycle; raise --damping.");
+            if (options_.flesh.frequency > clip.frames_per_second / 2)
+                session_.warn(of + "springs of more than half the frame rate look slower than they are; raise "
+                                   "--frame-rate or lower --frequency.");
+            if (m.furthest > kFarFromSkin && options_.soft.empty())
+                session_.warn(fmt::format("{}the flesh is {:.0f} % of the diagonal away from its skin; raise "
+                                          "--surface-frequency, --frequency or --stiffness to hold it.",
+                                          of, 100 * m.furthest));
+            if (m.overlap > kMuchOverlap && m.overlap > m.skin_overlap)
+                session_.warn(of + "parts of the body overlap more than in the skin; take more --particles, or a "
+                                   "larger --core.");
+            if (m.is_closed && m.least_volume < kMuchVolumeLost)
+                session_.warn(fmt::format("{}the body loses {:.0f} % of its volume; a smaller --core lets the joints "
+                                          "keep it.",
+                                          of, 100 * (1 - m.least_volume)));
+            if (clip.inverted_cells > 0)
+                session_.warn(fmt::format("{}{} cells are inside out at the end, where the skin folds; a smaller "
+                                          "--core or more --particles help.",
+                                          of, with_commas(clip.inverted_cells)));
+        }
+    }
+
+    void doubt() const {
+        for (std::size_t c = 0; c < clips_.size(); ++c)
+            if (clips_[c].clamped_particles > 0 || clips_[c].unstable_substeps > 0)
+                throw Doubt{fmt::format("Clip '{}' cannot be trusted: the motion of {} particles was not finite, and "
+                                        "{} substeps were too long; raise --frame-rate, or lower --stiffness.",
+                                        names_[c], clips_[c].clamped_particles, clips_[c].unstable_substeps)};
+    }
+
+    const FleshArguments& options_;
+    Session& session_;
+    std::vector<std::size_t> clip_numbers_;
+    Flesh flesh_;
+    std::vector<FleshClip> clips_;
+    std::vector<FleshMeasure> measures_;
+    std::vector<std::string> names_;
+    Fitted fitted_;
+    std::vector<PoseSequence> poses_;
+    Report report_;
+};
+
+} // namespace
+
+Command flesh_command() {
+    const auto options = std::make_shared<FleshArguments>();
+    return {
+        .name = "flesh",
+        .text = "Make soft matter of a character that joints move, and write it as a skin again",
+        .options =
+            OptionList{
+                Option("character", options->input, "Animated glTF with a skin (.glb, .gltf)").is_read().required(),
+                Option("-o,--output", options->outputs,
+                       "Output: a skin with all clips (.glb), or one clip as a model (.fil), .pc2, .mdd, .usda or a "
+                       "folder of meshes (NAME/). May come several times")
+                    .is_written()
+                    .one_at_a_time()
+                    .required(),
+                Option("--clip", options->clips, "Clip by its name (default: all). May come several times")
+                    .one_at_a_time()
+                    .named("NAME"),
+                Option("--loop", options->clip.loop,
+                       "Clips are cycles: repeat each until its flesh is periodic, and end as it begins"),
+                Option("--soft", options->soft,
+                       "Joints that hold little, with all below them, such as \"Tail*\". May come several times")
+                    .one_at_a_time()
+                    .named("PATTERN"),
+                Option("--strength", options->strength, "How strong the joints of --soft hold, of 1")
+                    .between(0.0, 1.0)
+                    .with_default(),
+                Option("--ground", options->clip.ground, "A floor at the lowest point of each clip"),
+                Option("--joints", options->joints, "Joints of the output, about").whole_from(12).with_default(),
+                Option("--stiffness", options->flesh.material.young_modulus, "Young's modulus of the flesh, Pa")
+                    .above_zero()
+                    .with_default(),
+                Option("--density", options->flesh.material.density, "Density of the flesh, kg/m^3")
+                    .above_zero()
+                    .with_default(),
+                Option("--core", options->flesh.core,
+                       "How far from the bones to the skin all is held: 0 nothing, 1 everything")
+                    .between(0.0, 1.0)
+                    .with_default(),
+                Option("--frequency", options->flesh.frequency, "Hz, of the springs at the edge of the core")
+                    .between(0.0, 1e6)
+                    .with_default(),
+                Option("--surface-frequency", options->flesh.surface_frequency, "Hz, of the springs at the skin")
+                    .between(0.0, 1e6)
+                    .with_default(),
+                Option("--damping", options->flesh.damping, "1/s, of motion beside the animation")
+                    .between(0.0, 1e6)
+                    .with_default(),
+                Option("--particles", options->flesh.particles, "Particles of the flesh, about")
+                    .whole_from(64)
+                    .with_default(),
+                Option("--scale", options->flesh.scale,
+                       "Metres a unit of the file (default: 1, or the power of ten that makes 0.3 to 3 m of it)")
+                    .above_zero(),
+                Option("--frame-rate", options->clip.frames_per_second, "Frames a second that are simulated")
+                    .above_zero()
+                    .with_default(),
+                Option("--sags", options->sags, "Gravity bends the bind pose too (default: it is sculpted in)"),
+                Option("--no-self-contact", options->no_self_contact, "Parts of the body pass through each other"),
+                Option("--no-check", options->no_check, "Do not look for overlaps, which takes seconds")} +
+            animation_options(options->animation),
+        .examples = "  filigree flesh fox.glb -o soft.glb\n"
+                    "  filigree flesh fox.glb -o soft.glb --loop --soft \"b_Tail*\"\n"
+                    "  filigree flesh walk.glb -o soft.glb --clip Walk --stiffness 8000 --ground\n"
+                    "  filigree flesh walk.glb -o soft.fil --clip Walk --joints 1000",
+        .run = [options](Session& session) { FleshCommand(*options, session).run(); }};
+}
+
+} // namespace filigree::cli

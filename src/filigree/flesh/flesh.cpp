@@ -1,0 +1,418 @@
+// How a skinned mesh becomes a body, and what each of its particles follows.
+#include "filigree/flesh.h"
+
+#include "filigree/core/dense_solve.h"
+#include "filigree/core/math.h"
+#include "filigree/core/parallel_for.h"
+#include "filigree/flesh/inward_weights.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string_view>
+
+namespace filigree {
+
+namespace {
+
+constexpr std::size_t kTargetsGrain = 512; // particles
+constexpr double kKeepsScale = 0.05;       ///< joints that change their size by less are rigid
+constexpr double kLeastScale = 0.5, kMostScale = 2;
+constexpr float kCarries = 0.15f;         ///< weight from which a bone is near to a particle
+constexpr float kScaledShare = 0.25f;     ///< weight of joints that change their size
+constexpr float kHeldStrength = 0.75f;    ///< of joints that hold their core
+constexpr float kFreeStrength = 0.1f;     ///< of joints that have no leash
+constexpr double kLeafReach = 1.5;        ///< times the way from a last joint to the middle of what it carries
+constexpr float kThinDepth = 0.9f;        ///< spacings
+constexpr int kThinReach = 3;             ///< cells
+constexpr std::size_t kMostMoments = 120; ///< of a clip that are looked at for scales
+
+Error usage(std::string sentence) { return {ErrorCode::usage, std::move(sentence)}; }
+
+bool fits(std::string_view name, std::string_view pattern) {
+    if (pattern.empty()) return name.empty();
+    if (pattern[0] == '*') {
+        for (std::size_t skip = 0; skip <= name.size(); ++skip)
+            if (fits(name.substr(skip), pattern.substr(1))) return true;
+        return false;
+    }
+    return !name.empty() && (pattern[0] == '?' || pattern[0] == name[0]) && fits(name.substr(1), pattern.substr(1));
+}
+
+/// A line from one end to the other, m.
+struct Bone {
+    Index joint;
+    Vec3d from, to;
+
+    double distance(const Vec3d& point) const {
+        const Vec3d along = to - from;
+        const double squared = along.squaredNorm();
+        const double part = squared > 0 ? std::clamp((point - from).dot(along) / squared, 0.0, 1.0) : 0.0;
+        return (from + part * along - point).norm();
+    }
+};
+
+std::string list_of(const std::vector<std::string>& names) {
+    constexpr std::size_t kMost = 4;
+    std::string list;
+    for (std::size_t n = 0; n < std::min(names.size(), kMost); ++n) list += (n > 0 ? ", '" : "'") + names[n] + "'";
+    return names.size() > kMost ? list + " and " + std::to_string(names.size() - kMost) + " more" : list;
+}
+
+} // namespace
+
+Material flesh_material() { return {.density = 1000, .young_modulus = 1.5e4, .poisson_ratio = 0.45, .damping = 0}; }
+
+double flesh_scale(double size) {
+    double scale = 1;
+    if (!(size > 0) || !std::isfinite(size) || (size >= 0.1 && size <= 10)) return scale;
+    while (size * scale > 3) scale /= 10;
+    while (size * scale < 0.3) scale *= 10;
+    return scale;
+}
+
+/// Makes a Flesh, one thing after the other.
+class FleshMaker {
+public:
+    FleshMaker(SkinnedMesh skin, const FleshOptions& options, std::span<const std::size_t> clips,
+               const RunContext& context)
+        : context_(context), clips_(clips.begin(), clips.end()) {
+        flesh_.skin_ = std::make_shared<const SkinnedMesh>(std::move(skin));
+        flesh_.options_ = options;
+        if (clips_.empty())
+            for (std::size_t c = 0; c < flesh_.skin_->clips.size(); ++c) clips_.push_back(c);
+    }
+
+    Result<Flesh> make() {
+        if (Status fine = check(); !fine) return fine.error();
+        find_scales();
+        if (Status cut = cut_surface(); !cut) return cut.error();
+        if (Status made = make_matter(); !made) return made.error();
+        find_softness();
+        if (Status set = set_springs(); !set) return set.error();
+        collect_warnings();
+        return std::move(flesh_);
+    }
+
+private:
+    const SkinnedMesh& skin() const { return *flesh_.skin_; }
+    const Body& body() const { return *flesh_.body_; }
+
+    Status check() {
+        if (const std::string wrong = check_skin(skin()); !wrong.empty()) return usage(wrong);
+        FleshOptions& o = flesh_.options_;
+        const auto is_part = [](double x) { return x >= 0 && x <= 1; };
+        const auto is_number = [](double x) { return x >= 0 && std::isfinite(x); };
+        if (!is_number(o.scale)) return usage("The scale must be above 0, in metres a model unit.");
+        if (!is_part(o.core)) return usage("The core must be between 0 and 1.");
+        if (!is_number(o.frequency) || !is_number(o.surface_frequency))
+            return usage("The frequencies of the springs must be 0 Hz or more.");
+        if (!is_number(o.damping)) return usage("The damping must be 0 or more, per second.");
+        if (o.leash && !(*o.leash > 0)) return usage("The leash must be longer than 0 m.");
+        if (!(o.most_acceleration > 0)) return usage("The largest acceleration must be above 0 m/s^2.");
+        if (!o.gravity.allFinite()) return usage("Gravity must be finite.");
+        if (o.material.model != MaterialModel::fem) return usage("Flesh is of the model fem.");
+        for (const std::size_t clip : clips_)
+            if (clip >= skin().clips.size())
+                return usage("There is no clip " + std::to_string(clip) + "; the skin has " +
+                             std::to_string(skin().clips.size()) + ".");
+        if (o.scale == 0) o.scale = flesh_scale(bounds(skin().mesh).size().maxCoeff());
+        strengths_.assign(skin().joints.size(), 1);
+        std::vector<std::uint8_t> met(o.soft.size());
+        for (std::size_t j = 0; j < strengths_.size(); ++j) {
+            Index at = Index(j);
+            for (std::size_t steps = 0; at != kNoIndex && steps <= strengths_.size(); ++steps) {
+                const auto found = std::ranges::find_if(
+                    o.soft, [&](const SoftJoints& soft) { return fits(skin().joints[at].name, soft.pattern); });
+                if (found != o.soft.end()) {
+                    strengths_[j] = float(found->strength);
+                    met[std::size_t(found - o.soft.begin())] = 1;
+                    flesh_.report_.soft.push_back(skin().joints[j].name);
+                    break;
+                }
+                at = skin().joints[at].parent;
+            }
+        }
+        for (std::size_t s = 0; s < o.soft.size(); ++s) {
+            if (!is_part(o.soft[s].strength)) return usage("The strength of a soft joint must be between 0 and 1.");
+            if (met[s]) continue;
+            std::vector<std::string> names;
+            for (const SkinJoint& joint : skin().joints) names.push_back(joint.name);
+            return usage("No joint is called '" + o.soft[s].pattern + "'; there are " + list_of(names) + ".");
+        }
+        return Success{};
+    }
+
+    /// Which joints change their size in the clips, and which are no motion that flesh can follow.
+    void find_scales() {
+        const std::size_t count = skin().joints.size();
+        std::vector<double> least(count, 1), most(count, 1);
+        std::vector<Eigen::Affine3d> transforms(count);
+        for (const std::size_t clip : clips_) {
+            const double seconds = skin().clips[clip].seconds;
+            const auto moments = std::min(kMostMoments, std::size_t(seconds * 30) + 2);
+            for (std::size_t m = 0; m < moments; ++m) {
+                skin().transforms(clip, seconds * double(m) / double(moments - 1), transforms);
+                for (std::size_t j = 0; j < count; ++j) {
+                    const Mat3d linear = transforms[j].linear();
+                    const Vec3d s = singular_values_only(linear);
+                    least[j] = std::min(least[j], linear.determinant() > 0 && s.allFinite() ? s[2] : 0.0);
+                    most[j] = std::max(most[j], s.allFinite() ? s[0] : 1e9);
+                }
+            }
+        }
+        std::vector<double> carried(count);
+        for (std::size_t i = 0; i < skin().weights.joints.size(); ++i)
+            carried[skin().weights.joints[i]] += double(skin().weights.weights[i]);
+        is_scaled_.assign(count, 0);
+        is_odd_.assign(count, 0);
+        for (std::size_t j = 0; j < count; ++j) {
+            if (!(carried[j] > 0)) continue;
+            is_odd_[j] = least[j] < kLeastScale || most[j] > kMostScale;
+            is_scaled_[j] = !is_odd_[j] && (least[j] < 1 - kKeepsScale || most[j] > 1 + kKeepsScale);
+            if (is_scaled_[j]) flesh_.report_.scaled.push_back(skin().joints[j].name);
+            if (is_odd_[j]) flesh_.report_.left_out.push_back(skin().joints[j].name);
+        }
+    }
+
+    /// Leaves out faces of meshes without a skin, and those that odd joints carry.
+    Status cut_surface() {
+        const Mesh& mesh = skin().mesh;
+        const SkinWeights& weights = skin().weights;
+        flesh_.left_out_.assign(mesh.vertex_count(), 0);
+        for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+            float odd = 0;
+            for (Index i = weights.first[v]; i < weights.first[v + 1]; ++i) {
+                const Index joint = weights.joints[i];
+                if (is_odd_[joint] || skin().joints[joint].is_node_of_mesh) odd += weights.weights[i];
+            }
+            flesh_.left_out_[v] = odd > 0.5f;
+        }
+        Mesh& surface = flesh_.surface_;
+        surface.positions = mesh.positions;
+        std::vector<std::uint8_t> is_used(mesh.vertex_count());
+        for (std::size_t f = 0; f < mesh.face_count(); ++f) {
+            const auto face = mesh.face(f);
+            if (std::ranges::any_of(face, [&](Index v) { return flesh_.left_out_[v]; })) continue;
+            surface.add_face(face);
+            for (const Index v : face) is_used[v] = 1;
+        }
+        for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
+            if (!is_used[v]) flesh_.left_out_[v] = 1;
+            flesh_.report_.left_out_vertices += flesh_.left_out_[v];
+        }
+        if (surface.face_count() == 0)
+            return Error{ErrorCode::unsuitable,
+                         flesh_.report_.left_out.empty()
+                             ? std::string("No face hangs on a joint of a skin.")
+                             : "All faces hang on joints that are mirrored, or that clips scale beyond 1/2 and 2 (" +
+                                   list_of(flesh_.report_.left_out) +
+                                   "); flesh keeps its size. Choose other clips with --clip, or take the scale out of "
+                                   "them."};
+        return Success{};
+    }
+
+    Status make_matter() {
+        BodyOptions options;
+        options.scale = flesh_.options_.scale;
+        options.cells.count = flesh_.options_.particles;
+        Result<Body> made =
+            make_body(flesh_.surface_, flesh_.options_.material, options, context_, &flesh_.report_.body);
+        if (!made) return made.error();
+        flesh_.body_ = std::make_shared<const Body>(std::move(*made));
+        neighbours_ = lattice_neighbours(body());
+        Result<std::vector<FleshWeights>> found =
+            inward_weights(body(), flesh_.surface_, skin().weights, skin().joints.size(), neighbours_, context_);
+        if (!found) return found.error();
+        flesh_.weights_ = std::move(*found);
+        return Success{};
+    }
+
+    /// From joint to joint; a last joint reaches beyond the middle of what it carries.
+    std::vector<Bone> find_bones() const {
+        const SkinWeights& weights = skin().weights;
+        const std::size_t count = skin().joints.size();
+        std::vector<std::uint8_t> has_child(count);
+        std::vector<Bone> bones;
+        const double scale = flesh_.options_.scale;
+        for (std::size_t j = 0; j < count; ++j) {
+            const Index parent = skin().joints[j].parent;
+            if (parent == kNoIndex || skin().joints[j].is_node_of_mesh) continue;
+            has_child[parent] = 1;
+            bones.push_back({parent, scale * skin().joints[parent].place, scale * skin().joints[j].place});
+        }
+        std::vector<Vec3d> middles(count, Vec3d::Zero());
+        std::vector<double> totals(count);
+        for (std::size_t v = 0; v + 1 < weights.first.size(); ++v)
+            for (Index i = weights.first[v]; i < weights.first[v + 1]; ++i) {
+                const auto weight = double(weights.weights[i]);
+                middles[weights.joints[i]] += weight * skin().mesh.positions[v].cast<double>();
+                totals[weights.joints[i]] += weight;
+            }
+        for (std::size_t j = 0; j < count; ++j) {
+            if (has_child[j] || !(totals[j] > 0)) continue;
+            const Vec3d from = skin().joints[j].place, middle = middles[j] / totals[j];
+            bones.push_back({Index(j), scale * from, scale * (from + kLeafReach * (middle - from))});
+        }
+        return bones;
+    }
+
+    void find_softness() {
+        const std::size_t count = body().particle_count();
+        const auto h = float(body().spacing());
+        std::vector<float> depth(count);
+        for (std::size_t i = 0; i < count; ++i)
+            depth[i] = std::max(0.0f, -body().field->distance(body().rest[i]) - body().field_radius);
+        const std::vector<Bone> bones = find_bones();
+        flesh_.softness_.assign(count, 1);
+        parallel_for(context_, count, kTargetsGrain, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i) {
+                const Vec3d at = body().rest[i].cast<double>();
+                double nearest = std::numeric_limits<double>::infinity();
+                for (const Bone& bone : bones)
+                    if (weight_of(i, bone.joint) > kCarries) nearest = std::min(nearest, bone.distance(at));
+                if (std::isfinite(nearest))
+                    flesh_.softness_[i] = float(nearest / std::max(nearest + double(depth[i]), 1e-12));
+            }
+        });
+        std::vector<float> deepest = depth; // within a few cells
+        for (int step = 0; step < kThinReach; ++step) {
+            const std::vector<float> before = deepest;
+            for (std::size_t i = 0; i < count; ++i)
+                for (const Index n : neighbours_[i])
+                    if (n != kNoIndex) deepest[i] = std::max(deepest[i], before[n]);
+        }
+        is_thin_.assign(count, 0);
+        for (std::size_t i = 0; i < count; ++i) is_thin_[i] = deepest[i] < kThinDepth * h;
+    }
+
+    float weight_of(std::size_t particle, Index joint) const {
+        const FleshWeights& of = flesh_.weights_[particle];
+        float sum = 0;
+        for (std::size_t k = 0; k < FleshWeights::kMost; ++k)
+            if (of.joints[k] == joint) sum += of.weights[k];
+        return sum;
+    }
+
+    Status set_springs() {
+        const FleshOptions& o = flesh_.options_;
+        Follow& follow = flesh_.follow_;
+        const std::size_t count = body().particle_count();
+        const auto leash = float(o.leash.value_or(2 * body().spacing()));
+        follow.damping = {float(o.damping)};
+        follow.most_acceleration = o.most_acceleration;
+        flesh_.linear_.assign(count, 0);
+        for (std::size_t i = 0; i < count; ++i) {
+            const FleshWeights& of = flesh_.weights_[i];
+            float strength = 0, scaled = 0;
+            for (std::size_t k = 0; k < FleshWeights::kMost; ++k) {
+                strength += of.weights[k] * strengths_[of.joints[k]];
+                scaled += of.weights[k] * float(is_scaled_[of.joints[k]]);
+            }
+            const double u = double(flesh_.softness_[i]);
+            flesh_.linear_[i] = scaled > kScaledShare;
+            const bool is_held = flesh_.linear_[i] || (u < o.core && strength > kHeldStrength) || o.core >= 1;
+            const double out = std::clamp((1 - u) / std::max(1 - o.core, 1e-9), 0.0, 1.0);
+            double frequency = o.surface_frequency + (o.frequency - o.surface_frequency) * out * std::sqrt(out);
+            if (is_thin_[i]) frequency = std::max(frequency, o.frequency);
+            follow.frequency.push_back(is_held ? std::numeric_limits<float>::infinity()
+                                               : float(frequency) * std::sqrt(strength));
+            follow.leash.push_back(strength < kFreeStrength ? std::numeric_limits<float>::infinity()
+                                                            : leash / (strength * strength));
+            flesh_.report_.held += is_held;
+            flesh_.report_.thin += is_thin_[i];
+        }
+        if (flesh_.report_.held == count)
+            return Error{ErrorCode::unsuitable,
+                         flesh_.report_.scaled.empty()
+                             ? std::string("Everything is held by the core; choose a smaller --core.")
+                             : "All of it hangs on joints that change their size (" + list_of(flesh_.report_.scaled) +
+                                   "), which flesh does not; take the scale out of the clip."};
+        return Success{};
+    }
+
+    void collect_warnings() {
+        FleshReport& report = flesh_.report_;
+        std::vector<std::string>& warnings = report.warnings;
+        if (!report.body.warning.empty()) warnings.push_back(report.body.warning);
+        if (!report.left_out.empty())
+            warnings.push_back("Joints that are mirrored or scaled beyond 1/2 and 2 carry their vertices as before, "
+                               "without flesh: " +
+                               list_of(report.left_out) + ".");
+        if (!report.scaled.empty())
+            warnings.push_back("Joints that change their size hold what they carry, which is not soft: " +
+                               list_of(report.scaled) + ".");
+        const auto thin = double(report.thin) / double(body().particle_count());
+        if (thin > 0.5)
+            warnings.push_back(std::to_string(int(100 * thin + 0.5)) +
+                               " % of the particles are in parts fewer than two cells thick, which follow as a whole; "
+                               "take more particles.");
+    }
+
+    const RunContext& context_;
+    std::vector<std::size_t> clips_;
+    Flesh flesh_;
+    std::vector<float> strengths_;        ///< of joints
+    std::vector<std::uint8_t> is_scaled_; ///< of joints
+    std::vector<std::uint8_t> is_odd_;    ///< of joints
+    std::vector<std::array<Index, 6>> neighbours_;
+    std::vector<std::uint8_t> is_thin_; ///< of particles
+};
+
+Result<Flesh> Flesh::create(SkinnedMesh skin, const FleshOptions& options, std::span<const std::size_t> clips,
+                            const RunContext& context) {
+    return FleshMaker(std::move(skin), options, clips, context).make();
+}
+
+void Flesh::targets(std::span<const Eigen::Affine3d> transforms, const Vec3d& offset, Vectors& positions,
+                    Vectors* accelerations, const RunContext& context) const {
+    struct Joint {
+        Eigen::Vector4d real, dual; ///< x, y, z, w
+        Eigen::Affine3d whole;      ///< m
+    };
+    std::vector<Joint> joints(transforms.size());
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+        const Mat3d turn = nearest_rotation(transforms[j].linear());
+        const Eigen::Quaterniond q(turn);
+        const Vec3d place = skin_->joints[j].place; // where a joint that changes its size stays in its place
+        const Vec3d shift = scale() * (transforms[j] * place - turn * place) - offset;
+        const Eigen::Quaterniond half(0, 0.5 * shift.x(), 0.5 * shift.y(), 0.5 * shift.z());
+        joints[j].real = q.coeffs();
+        joints[j].dual = (half * q).coeffs();
+        joints[j].whole = transforms[j];
+        joints[j].whole.translation() = scale() * transforms[j].translation() - offset;
+    }
+    const std::size_t count = body_->particle_count();
+    if (positions.size() != count) positions = Vectors(count);
+    if (accelerations && accelerations->size() != count) *accelerations = Vectors(count);
+    const Vec3d undone = -options_.gravity;
+    parallel_for(context, count, kTargetsGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            const FleshWeights& of = weights_[i];
+            const Vec3d rest = body_->rest[i].cast<double>();
+            Eigen::Vector4d real = Eigen::Vector4d::Zero(), dual = Eigen::Vector4d::Zero();
+            const Eigen::Vector4d& first = joints[of.joints[0]].real;
+            for (std::size_t k = 0; k < FleshWeights::kMost && of.weights[k] > 0; ++k) {
+                const Joint& joint = joints[of.joints[k]];
+                const double weight = joint.real.dot(first) < 0 ? -double(of.weights[k]) : double(of.weights[k]);
+                real += weight * joint.real;
+                dual += weight * joint.dual;
+            }
+            const double inverse = 1 / std::max(real.norm(), 1e-12);
+            real *= inverse;
+            dual *= inverse;
+            const Vec3d r = real.head<3>(), d = dual.head<3>();
+            const auto turned = [&](const Vec3d& v) -> Vec3d { return v + 2 * r.cross(r.cross(v) + real[3] * v); };
+            Vec3d place = turned(rest) + 2 * (real[3] * d - dual[3] * r + r.cross(d));
+            if (linear_[i]) {
+                place.setZero();
+                for (std::size_t k = 0; k < FleshWeights::kMost && of.weights[k] > 0; ++k)
+                    place += double(of.weights[k]) * (joints[of.joints[k]].whole * rest);
+            }
+            positions.set(i, place.cast<float>());
+            if (accelerations) accelerations->set(i, turned(undone).cast<float>());
+        }
+    });
+}
+
+} // namespace filigree
