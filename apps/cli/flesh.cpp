@@ -4,6 +4,7 @@
 #include "filigree/fit.h"
 #include "filigree/flesh.h"
 #include "filigree/io/system/extension.h"
+#include "filigree/mesh/weld.h"
 
 #include <algorithm>
 #include <cmath>
@@ -87,6 +88,14 @@ std::vector<std::size_t> chosen_clips(const FleshArguments& options, const Skinn
         refuse(ErrorCode::unsuitable, options.input + ": its clips are single poses, and nothing moves.");
     if (!poses.empty()) session.warn("Clips that are a single pose were left out: " + poses + ".");
     return chosen;
+}
+
+/// A driver has no more vertices than there are places.
+std::size_t places_of_faces(const Mesh& mesh) {
+    const std::vector<Index> first = weld_map(mesh.positions);
+    std::vector<std::uint8_t> is_used(mesh.vertex_count());
+    for (const Index v : mesh.corners) is_used[first[v]] = 1;
+    return std::size_t(std::ranges::count(is_used, 1));
 }
 
 /// Clips of one name get numbers.
@@ -173,7 +182,8 @@ private:
             carrier.at(clips_[clip], of_clip, positions, {}, silent);
             return Success{};
         };
-        fitted_ = require(fit_animation(animation, {.base = options_.joints}, session_.context()));
+        const std::size_t most = std::min(options_.joints, places_of_faces(mesh));
+        fitted_ = require(fit_animation(animation, {.base = most}, session_.context()));
         std::size_t first = 0;
         for (std::size_t c = 0; c < clips_.size(); ++c) {
             PoseSequence& poses = poses_.emplace_back();

@@ -20,7 +20,7 @@
 
 namespace filigree {
 
-/// Soft tissue, chosen for how it moves: 1,000 kg/m^3, 15 kPa, Poisson's ratio 0.45. Damping is FleshOptions::damping.
+/// Soft tissue, chosen for how it moves: 1,000 kg/m^3, 15 kPa, Poisson's ratio 0.47. Damping is FleshOptions::damping.
 Material flesh_material();
 
 /// Joints that hold less than others, with all joints below them.

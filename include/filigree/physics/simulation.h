@@ -90,9 +90,9 @@ struct Follow {
     double most_acceleration = 100;
 };
 
-/// Velocities of targets in m/s, from their places in three frames: the mean of both differences, no longer than three
-/// times the shorter one, so that the cubic curve through the places overshoots nowhere [Fritsch and Carlson 1980].
-/// All three have the same size. frames_per_second: above 0. Cost O(particles).
+/// Velocities of targets, m/s, from their places in three frames of one size: the mean of the ways before and after,
+/// each weighted by the other's square [van Albada 1982], so that the cubic curve through the places does not overshoot
+/// beside a jump. frames_per_second: above 0. Cost O(particles).
 Vectors target_velocities(const Vectors& before, const Vectors& now, const Vectors& after, double frames_per_second);
 
 // ---------------------------------------------------------------------------------------------------------------------

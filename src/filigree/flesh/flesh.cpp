@@ -18,14 +18,15 @@ namespace {
 constexpr std::size_t kTargetsGrain = 512; // particles
 constexpr double kKeepsScale = 0.05;       ///< joints that change their size by less are rigid
 constexpr double kLeastScale = 0.5, kMostScale = 2;
-constexpr float kCarries = 0.15f;         ///< weight from which a bone is near to a particle
-constexpr float kScaledShare = 0.25f;     ///< weight of joints that change their size
-constexpr float kHeldStrength = 0.75f;    ///< of joints that hold their core
-constexpr float kFreeStrength = 0.1f;     ///< of joints that have no leash
-constexpr double kLeafReach = 1.5;        ///< times the way from a last joint to the middle of what it carries
-constexpr float kThinDepth = 0.9f;        ///< spacings
-constexpr int kThinReach = 3;             ///< cells
-constexpr std::size_t kMostMoments = 120; ///< of a clip that are looked at for scales
+constexpr float kCarries = 0.15f;              ///< weight from which a bone is near to a particle
+constexpr float kScaledShare = 0.25f;          ///< weight of joints that change their size
+constexpr float kHeldStrength = 0.75f;         ///< of joints that hold their core
+constexpr float kFreeStrength = 0.1f;          ///< of joints that have no leash
+constexpr double kLeafReach = 1.5;             ///< times the way from a last joint to the middle of what it carries
+constexpr float kFolded = 0.3f, kWhole = 0.7f; ///< volume of a cell that the joints alone leave: from free to held
+constexpr float kThinDepth = 0.9f;             ///< spacings
+constexpr int kThinReach = 3;                  ///< cells
+constexpr std::size_t kMostMoments = 120;      ///< of a clip that are looked at for scales
 
 Error usage(std::string sentence) { return {ErrorCode::usage, std::move(sentence)}; }
 
@@ -61,7 +62,7 @@ std::string list_of(const std::vector<std::string>& names) {
 
 } // namespace
 
-Material flesh_material() { return {.density = 1000, .young_modulus = 1.5e4, .poisson_ratio = 0.45, .damping = 0}; }
+Material flesh_material() { return {.density = 1000, .young_modulus = 1.5e4, .poisson_ratio = 0.47, .damping = 0}; }
 
 double flesh_scale(double size) {
     double scale = 1;
@@ -89,6 +90,7 @@ public:
         if (Status cut = cut_surface(); !cut) return cut.error();
         if (Status made = make_matter(); !made) return made.error();
         find_softness();
+        find_folds();
         if (Status set = set_springs(); !set) return set.error();
         collect_warnings();
         return std::move(flesh_);
@@ -143,23 +145,29 @@ private:
         return Success{};
     }
 
+    /// Calls visit(seconds) for moments of a clip: 30 a second, or fewer.
+    template <class Visit>
+    void each_moment(std::size_t clip, const Visit& visit) const {
+        const double seconds = skin().clips[clip].seconds;
+        const auto moments = std::min(kMostMoments, std::size_t(seconds * 30) + 2);
+        for (std::size_t m = 0; m < moments; ++m) visit(seconds * double(m) / double(moments - 1));
+    }
+
     /// Which joints change their size in the clips, and which are no motion that flesh can follow.
     void find_scales() {
         const std::size_t count = skin().joints.size();
         std::vector<double> least(count, 1), most(count, 1);
         std::vector<Eigen::Affine3d> transforms(count);
         for (const std::size_t clip : clips_) {
-            const double seconds = skin().clips[clip].seconds;
-            const auto moments = std::min(kMostMoments, std::size_t(seconds * 30) + 2);
-            for (std::size_t m = 0; m < moments; ++m) {
-                skin().transforms(clip, seconds * double(m) / double(moments - 1), transforms);
+            each_moment(clip, [&](double seconds) {
+                skin().transforms(clip, seconds, transforms);
                 for (std::size_t j = 0; j < count; ++j) {
                     const Mat3d linear = transforms[j].linear();
                     const Vec3d s = singular_values_only(linear);
                     least[j] = std::min(least[j], linear.determinant() > 0 && s.allFinite() ? s[2] : 0.0);
                     most[j] = std::max(most[j], s.allFinite() ? s[0] : 1e9);
                 }
-            }
+            });
         }
         std::vector<double> carried(count);
         for (std::size_t i = 0; i < skin().weights.joints.size(); ++i)
@@ -286,6 +294,33 @@ private:
         for (std::size_t i = 0; i < count; ++i) is_thin_[i] = deepest[i] < kThinDepth * h;
     }
 
+    /// How far the joints alone crush each cell in the clips: a bone that holds a crushed cell turns it inside out.
+    void find_folds() {
+        flesh_.linear_.assign(body().particle_count(), 0);
+        least_volume_.assign(body().particle_count(), 1);
+        std::vector<Eigen::Affine3d> transforms(skin().joints.size());
+        const auto& cells = body().cells.cell_corners;
+        std::vector<float> of_cell(cells.size(), 1);
+        const auto inverse = float(1 / body().spacing());
+        Vectors at;
+        for (const std::size_t clip : clips_)
+            each_moment(clip, [&](double seconds) {
+                skin().transforms(clip, seconds, transforms);
+                flesh_.targets(transforms, Vec3d::Zero(), at, nullptr, context_);
+                parallel_for(context_, cells.size(), kTargetsGrain, [&](std::size_t begin, std::size_t end) {
+                    for (std::size_t c = begin; c < end; ++c) {
+                        Mat3f gradient = Mat3f::Zero();
+                        for (int corner = 0; corner < 8; ++corner)
+                            for (int axis = 0; axis < 3; ++axis)
+                                gradient.col(axis) += (corner >> axis & 1 ? 0.25f : -0.25f) * at[cells[c][corner]];
+                        of_cell[c] = std::min(of_cell[c], (inverse * gradient).determinant());
+                    }
+                });
+            });
+        for (std::size_t c = 0; c < cells.size(); ++c)
+            for (const Index corner : cells[c]) least_volume_[corner] = std::min(least_volume_[corner], of_cell[c]);
+    }
+
     float weight_of(std::size_t particle, Index joint) const {
         const FleshWeights& of = flesh_.weights_[particle];
         float sum = 0;
@@ -301,7 +336,6 @@ private:
         const auto leash = float(o.leash.value_or(2 * body().spacing()));
         follow.damping = {float(o.damping)};
         follow.most_acceleration = o.most_acceleration;
-        flesh_.linear_.assign(count, 0);
         for (std::size_t i = 0; i < count; ++i) {
             const FleshWeights& of = flesh_.weights_[i];
             float strength = 0, scaled = 0;
@@ -311,10 +345,13 @@ private:
             }
             const double u = double(flesh_.softness_[i]);
             flesh_.linear_[i] = scaled > kScaledShare;
-            const bool is_held = flesh_.linear_[i] || (u < o.core && strength > kHeldStrength) || o.core >= 1;
+            const float whole = std::clamp((least_volume_[i] - kFolded) / (kWhole - kFolded), 0.0f, 1.0f);
+            const bool is_held =
+                flesh_.linear_[i] || (u < o.core && strength > kHeldStrength && whole >= 1) || o.core >= 1;
             const double out = std::clamp((1 - u) / std::max(1 - o.core, 1e-9), 0.0, 1.0);
             double frequency = o.surface_frequency + (o.frequency - o.surface_frequency) * out * std::sqrt(out);
             if (is_thin_[i]) frequency = std::max(frequency, o.frequency);
+            frequency = o.surface_frequency + (frequency - o.surface_frequency) * double(whole);
             follow.frequency.push_back(is_held ? std::numeric_limits<float>::infinity()
                                                : float(frequency) * std::sqrt(strength));
             follow.leash.push_back(strength < kFreeStrength ? std::numeric_limits<float>::infinity()
@@ -357,6 +394,7 @@ private:
     std::vector<std::uint8_t> is_odd_;    ///< of joints
     std::vector<std::array<Index, 6>> neighbours_;
     std::vector<std::uint8_t> is_thin_; ///< of particles
+    std::vector<float> least_volume_;   ///< of particles: of their cells, where the joints have them, over that at rest
 };
 
 Result<Flesh> Flesh::create(SkinnedMesh skin, const FleshOptions& options, std::span<const std::size_t> clips,

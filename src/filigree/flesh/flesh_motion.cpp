@@ -11,7 +11,7 @@ namespace filigree {
 
 namespace {
 
-constexpr double kSameAgain = 1e-4;       ///< of the diagonal, rms: a loop is periodic
+constexpr double kSameAgain = 5e-4;       ///< of the diagonal, rms: a loop is periodic
 constexpr double kFadeFrom = 0.75;        ///< of the cycle
 constexpr double kFarthestTravel = 2000;  ///< m, in a clip: 32-bit floats are too coarse beyond half of it
 constexpr float kSamePlace = 1e-4f;       ///< spacings: where a loop begins again

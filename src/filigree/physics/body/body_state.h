@@ -47,6 +47,7 @@ struct BodyState {
     double mean_damping = 1;          ///< the same of the whole body, by mass
     bool may_sleep = true;            ///< Actor::may_sleep
     bool is_held = false;             ///< by pins, forces or wind: not left to itself
+    bool follows = false;             ///< the targets of an animation
     std::optional<RigidPose> rigid;   ///< of a rigid body
     bool is_stiff = false; ///< its bounces are over before they are seen, and are what restitution says (stiff_hits.h)
     BodyHit hit;           ///< of a stiff body

@@ -22,6 +22,7 @@ ElasticReport Elasticity::damped_forces(const Vectors& positions, const Internal
     return report;
 }
 void Elasticity::finish_substep(const Vectors&, float, const RunContext&) {}
+void Elasticity::set_crush_share(float) {}
 std::size_t Elasticity::flowed_out() const { return 0; }
 std::span<const PlasticCell> Elasticity::plastic_cells() const { return {}; }
 void Elasticity::take_over(std::span<const PlasticCell>, std::span<const Index>) {}

@@ -142,6 +142,10 @@ public:
         corner_gradients(body_.cells, positions, gradients, context);
     }
 
+    void set_crush_share(float share) override {
+        plan_.material.crush = share * cell_kernel::cell_material(body_.material, body_.spacing()).crush;
+    }
+
 private:
     ElasticReport stacked_forces(const Vectors& positions, const InternalDamping* damping, Vectors& forces,
                                  const RunContext& context) {

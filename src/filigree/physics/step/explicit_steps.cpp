@@ -406,7 +406,7 @@ private:
         }
         if (debts_[b].has_begun()) debts_[b].moved(body, body.forces);
         const float ratio = elastic_[b].least_volume_ratio; // what is inside out has to move to come back
-        const bool is_crushed = ratio > 0 && ratio < InternalDamping::kDampedBelow;
+        const bool is_crushed = ratio > 0 && ratio < InternalDamping::kDampedBelow && !body.follows;
         vibrations_[b].elastic = is_crushed ? body.forces : Vectors();
     }
 
@@ -416,7 +416,8 @@ private:
             const Stopwatch watch(report_.contact_seconds);
             if (state_.contacts.is_too_deep())
                 each_elastic([&](BodyState& body, std::size_t b) {
-                    if (state_.contacts.touches(b) && !debts_[b].has_begun()) debts_[b].before_push(body, context_);
+                    if (state_.contacts.touches(b) && !debts_[b].has_begun() && !body.follows)
+                        debts_[b].before_push(body, context_);
                 });
             push_out(state_, now_, context_);
             state_.contacts.events().keep_forces();

@@ -94,6 +94,8 @@ void note_flow(const SimulationState& state, FrameReport& report) {
     }
 }
 
+constexpr float kFollowingCrush = 0.02f; ///< of bodies that follow an animation: Elasticity::set_crush_share
+
 /// Substeps until the frame ends. What is not finite is held on the way, and the rest of the frame goes on from there;
 /// a state that is lost again and again stays as it is until the next frame. Returns how many particles were held.
 std::size_t step_bodies(SimulationState& state, double from, double until, FrameReport& report,
@@ -300,8 +302,8 @@ Status Simulation::set_follow(std::size_t body, Follow follow, const Vectors& po
     const bool follows = place != targets.end() && place->memory.actor == body;
     BodyState& state = state_->body_of(body);
     if (follow.frequency.empty()) {
-        if (follows) targets.erase(place);
         release_targets(*state_, state);
+        if (follows) targets.erase(place);
         return Success{};
     }
     if (state.rigid || state.is_on_grid || state.broken)
@@ -317,6 +319,8 @@ Status Simulation::set_follow(std::size_t body, Follow follow, const Vectors& po
     if (const std::string wrong = check_follow(follow, positions.size()); !wrong.empty()) return usage(wrong);
     release_targets(*state_, state);
     Targets made(body, std::move(follow), positions, velocities, state.body->spacing());
+    state.follows = true;
+    state.elasticity->set_crush_share(kFollowingCrush);
     for (const Index i : made.held) {
         state.fixed[i] = 1;
         state.inverse_mass[i] = 0;

@@ -42,7 +42,8 @@ Vectors target_velocities(const Vectors& before, const Vectors& now, const Vecto
     const auto rate = float(frames_per_second);
     for (std::size_t i = 0; i < now.size(); ++i) {
         const Vec3f come = now[i] - before[i], go = after[i] - now[i];
-        velocities.set(i, rate * no_longer(0.5f * (come + go), kMostSpeed * std::min(come.norm(), go.norm())));
+        const float came = come.squaredNorm(), goes = go.squaredNorm(), both = came + goes;
+        if (both > 0) velocities.set(i, rate / both * (goes * come + came * go));
     }
     return velocities;
 }
@@ -155,6 +156,8 @@ Targets::Weights::Weights(float part, float seconds) {
 void release_targets(SimulationState& state, BodyState& body) {
     const auto found = std::ranges::find(state.targets, body.actor, [](const Targets& t) { return t.memory.actor; });
     if (found == state.targets.end()) return;
+    body.follows = false;
+    body.elasticity->set_crush_share(1);
     for (const Index i : found->held) {
         body.fixed[i] = 0;
         body.inverse_mass[i] = 1 / body.body->mass[i];

@@ -1,0 +1,203 @@
+// Skins that become soft matter.
+#include "filigree/flesh.h"
+
+#include "flesh/made_skins.h"
+#include "threads.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+namespace filigree {
+namespace {
+
+using namespace filigree_test;
+
+constexpr unsigned kCoarse = 6;
+const FleshOptions kSmall = {.particles = 400, .material = {.young_modulus = 2e4, .poisson_ratio = 0.45, .damping = 0}};
+const FleshClipOptions kThirty = {.frames_per_second = 30};
+
+FleshMeasure measure(const Flesh& flesh, const FleshClip& clip) { return measure_flesh(flesh, clip, 0).value(); }
+
+TEST(Flesh, AnElbowKeepsItsVolumeWhereTheSkinLosesIt) {
+    const Flesh flesh = Flesh::create(tube(kCoarse, 1, elbow(110, 1)), kSmall).value();
+    EXPECT_GT(flesh.report().held, 10u);
+    EXPECT_LT(flesh.report().held, flesh.body()->particle_count() / 2);
+    const FleshClip clip = simulate_flesh(flesh, 0, kThirty).value();
+    ASSERT_EQ(clip.frames.size(), 31u);
+    EXPECT_EQ(clip.clamped_particles, 0u);
+    const FleshMeasure m = measure(flesh, clip);
+    EXPECT_TRUE(m.is_closed);
+    EXPECT_LT(m.skin_least_volume, 0.97);
+    EXPECT_GT(m.least_volume, m.skin_least_volume + 0.01);
+    EXPECT_LT(m.most_volume, 1.02);
+}
+
+TEST(Flesh, ATwistKeepsItsVolume) {
+    const Flesh flesh = Flesh::create(tube(kCoarse, 1, twist(170, 1)), kSmall).value();
+    const FleshMeasure m = measure(flesh, simulate_flesh(flesh, 0, kThirty).value());
+    EXPECT_LT(m.skin_least_volume, 0.92);
+    EXPECT_GT(m.least_volume, 0.985);
+}
+
+TEST(Flesh, AtRestNothingSagsUnlessItIsAskedTo) {
+    const TubeMotion still = [](double) { return std::pair(0.0, 0.0); };
+    FleshOptions options = kSmall;
+    const Flesh sculpted = Flesh::create(tube(kCoarse, 0.5, still), options).value();
+    options.sculpted_gravity = false;
+    const Flesh sagging = Flesh::create(tube(kCoarse, 0.5, still), options).value();
+    EXPECT_LT(measure(sculpted, simulate_flesh(sculpted, 0, kThirty).value()).furthest, 1e-4);
+    EXPECT_GT(measure(sagging, simulate_flesh(sagging, 0, kThirty).value()).furthest, 1e-3);
+}
+
+TEST(Flesh, ALoopEndsAsItBegins) {
+    const Flesh flesh = Flesh::create(tube(kCoarse, 0.77, waving(40, 1 / 0.77)), kSmall).value();
+    const FleshClip clip = simulate_flesh(flesh, 0, {.frames_per_second = 30, .loop = true}).value();
+    EXPECT_TRUE(clip.is_loop);
+    EXPECT_GE(clip.cycles, 2u);
+    EXPECT_NEAR(double(clip.frames.size() - 1) / clip.frames_per_second, 0.77, 1e-9);
+    EXPECT_LT(clip.loop_rms, 0.01);
+    const Vectors &first = clip.frames.front(), &last = clip.frames.back();
+    for (std::size_t i = 0; i < first.size(); ++i) ASSERT_EQ(first[i], last[i]) << i;
+}
+
+TEST(Flesh, FastTeleportingAndTurningMotionStaysWhole) {
+    const auto root = [](double t) {
+        Eigen::Affine3d at = Eigen::Affine3d::Identity();
+        if (t > 0.2) at.translation() = Vec3d(3, 0, 0);
+        if (t > 0.4) at.linear() = Eigen::AngleAxisd(std::numbers::pi, Vec3d::UnitY()).toRotationMatrix();
+        return at;
+    };
+    const Flesh flesh = Flesh::create(tube(kCoarse, 0.6, waving(60, 6), root), kSmall).value();
+    const FleshClip clip = simulate_flesh(flesh, 0).value();
+    EXPECT_EQ(clip.clamped_particles, 0u);
+    EXPECT_EQ(clip.unstable_substeps, 0u);
+    EXPECT_LT(clip.most_substeps, 60u);
+    EXPECT_EQ(clip.inverted_cells, 0u);
+    EXPECT_LT(measure(flesh, clip).furthest, 0.2);
+}
+
+TEST(Flesh, SizeDoesNotMatterBesideTheScale) {
+    const auto furthest = [](double size) {
+        SkinnedMesh skin = tube(kCoarse, 0.4, waving(40, 2.5));
+        for (Vec3f& p : skin.mesh.positions) p *= float(size);
+        for (SkinJoint& joint : skin.joints) joint.place *= size;
+        const auto unit = skin.transforms;
+        skin.transforms = [unit, size](std::size_t clip, double t, std::span<Eigen::Affine3d> out) {
+            unit(clip, t, out);
+            for (Eigen::Affine3d& joint : out) joint.translation() *= size;
+        };
+        const Flesh flesh = Flesh::create(std::move(skin), kSmall).value();
+        EXPECT_NEAR(flesh.scale() * size, 1, 1e-9);
+        return measure(flesh, simulate_flesh(flesh, 0, kThirty).value()).furthest;
+    };
+    const double one = furthest(1);
+    EXPECT_NEAR(furthest(100), one, 1e-3);
+    EXPECT_NEAR(furthest(0.01), one, 1e-3);
+}
+
+TEST(Flesh, SoftJointsHoldLess) {
+    FleshOptions options = kSmall;
+    const Flesh firm = Flesh::create(tube(kCoarse, 0.5, waving(40, 2)), options).value();
+    options.soft = {{"low*", 0.02}};
+    const Flesh loose = Flesh::create(tube(kCoarse, 0.5, waving(40, 2)), options).value();
+    EXPECT_EQ(loose.report().soft, std::vector<std::string>{"lower"});
+    EXPECT_LT(loose.report().held, firm.report().held);
+    EXPECT_GT(measure(loose, simulate_flesh(loose, 0, kThirty).value()).furthest,
+              3 * measure(firm, simulate_flesh(firm, 0, kThirty).value()).furthest);
+}
+
+/// A joint that grows carries hard matter; one that vanishes or is mirrored carries none.
+TEST(Flesh, JointsThatChangeTheirSizeAreHeldOrLeftOut) {
+    const auto scaled = [](const Vec3d& by) {
+        SkinnedMesh skin = tube(kCoarse, 0.3, waving(20, 2));
+        const auto plain = skin.transforms;
+        skin.transforms = [plain, by](std::size_t clip, double t, std::span<Eigen::Affine3d> out) {
+            plain(clip, t, out);
+            out[1] = out[1] * Eigen::Scaling(Vec3d(Vec3d::Ones() + (t / 0.3) * (by - Vec3d::Ones())));
+        };
+        return skin;
+    };
+    const Flesh grown = Flesh::create(scaled({1, 1.4, 1.4}), kSmall).value();
+    EXPECT_EQ(grown.report().scaled, std::vector<std::string>{"lower"});
+    EXPECT_EQ(grown.report().left_out_vertices, 0u);
+    const FleshClip clip = simulate_flesh(grown, 0, kThirty).value();
+    EXPECT_EQ(clip.clamped_particles, 0u);
+    EXPECT_LT(measure(grown, clip).furthest, 0.1);
+    for (const Vec3d& by : {Vec3d(1e-3, 1e-3, 1e-3), Vec3d(-1, 1, 1)}) {
+        const Flesh cut = Flesh::create(scaled(by), kSmall).value();
+        EXPECT_EQ(cut.report().left_out, std::vector<std::string>{"lower"});
+        EXPECT_GT(cut.report().left_out_vertices, cut.skin().mesh.vertex_count() / 4);
+        EXPECT_FALSE(cut.report().warnings.empty());
+        EXPECT_EQ(simulate_flesh(cut, 0, kThirty).value().clamped_particles, 0u);
+    }
+}
+
+TEST(Flesh, TheSameBytesForAnyThreads) {
+    const auto frames = [](unsigned threads) {
+        const RunContext context(threads);
+        const Flesh flesh = Flesh::create(tube(kCoarse, 0.2, waving(40, 2)), kSmall, {}, context).value();
+        return simulate_flesh(flesh, 0, kThirty, context).value().frames;
+    };
+    const std::vector<Vectors> one = frames(1), two = frames(2);
+    ASSERT_EQ(one.size(), two.size());
+    for (std::size_t f = 0; f < one.size(); ++f)
+        for (std::size_t i = 0; i < one[f].size(); ++i) ASSERT_EQ(one[f][i], two[f][i]);
+}
+
+TEST(Flesh, CarriesAnyVerticesWithGradients) {
+    const Flesh flesh = Flesh::create(tube(kCoarse, 0.2, waving(40, 2)), kSmall).value();
+    const FleshClip clip = simulate_flesh(flesh, 0, kThirty).value();
+    const std::vector<Index> some = {0, 17, 5};
+    std::vector<Vec3f> positions(3);
+    std::vector<Mat3f> gradients(3);
+    FleshCarrier carrier = FleshCarrier::create(flesh, some).value();
+    carrier.at(clip, 0, positions, gradients);
+    for (std::size_t k = 0; k < some.size(); ++k) {
+        EXPECT_LT((positions[k] - flesh.skin().mesh.positions[some[k]]).norm(), 1e-4f);
+        EXPECT_LT((gradients[k] - Mat3f::Identity()).norm(), 1e-2f);
+    }
+    EXPECT_FALSE(FleshCarrier::create(flesh, std::vector<Index>{1000000}).ok());
+}
+
+TEST(Flesh, RefusesWhatMakesNoSense) {
+    const auto refused = [](FleshOptions options) {
+        const Result<Flesh> made = Flesh::create(tube(kCoarse, 0.2, waving(40, 2)), options);
+        return made.ok() ? std::string() : made.error().message;
+    };
+    FleshOptions options = kSmall;
+    options.core = 1.5;
+    EXPECT_NE(refused(options).find("core"), std::string::npos);
+    options.core = 1;
+    EXPECT_NE(refused(options).find("held"), std::string::npos);
+    options = kSmall;
+    options.soft = {{"Tail*"}};
+    EXPECT_NE(refused(options).find("'upper', 'lower'"), std::string::npos);
+    options = kSmall;
+    options.leash = 0;
+    EXPECT_NE(refused(options), "");
+    options = kSmall;
+    options.material.model = MaterialModel::springs;
+    EXPECT_NE(refused(options), "");
+    SkinnedMesh broken = tube(kCoarse, 0.2, waving(40, 2));
+    broken.weights.weights[0] = 0.5f;
+    EXPECT_FALSE(Flesh::create(broken, kSmall).ok());
+    const Flesh flesh = Flesh::create(tube(kCoarse, 0.2, waving(40, 2)), kSmall).value();
+    EXPECT_FALSE(simulate_flesh(flesh, 1).ok());
+    EXPECT_FALSE(simulate_flesh(flesh, 0, {.frames_per_second = 0}).ok());
+    const auto far = [](double t) { return Eigen::Affine3d(Eigen::Translation3d(Vec3d(0, 0, 5000 * t))); };
+    const Flesh runs = Flesh::create(tube(kCoarse, 1, waving(40, 2), far), kSmall).value();
+    EXPECT_NE(simulate_flesh(runs, 0).error().message.find("travels"), std::string::npos);
+}
+
+TEST(Flesh, UnitsAreGuessedByTheSize) {
+    EXPECT_EQ(flesh_scale(1.7), 1);
+    EXPECT_EQ(flesh_scale(0.12), 1);
+    EXPECT_NEAR(flesh_scale(155), 0.01, 1e-12);
+    EXPECT_NEAR(flesh_scale(1700), 0.001, 1e-12);
+    EXPECT_NEAR(flesh_scale(0.017), 100, 1e-9);
+    EXPECT_EQ(flesh_scale(0), 1);
+}
+
+} // namespace
+} // namespace filigree
