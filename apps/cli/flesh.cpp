@@ -26,6 +26,7 @@ constexpr double kRestlessLoop = 5e-3; // of the diagonal
 constexpr double kAlreadyLoops = 0.01; // of the diagonal
 constexpr double kMuchVolumeLost = 0.95;
 constexpr std::size_t kOverlapFrames = 4;
+constexpr std::size_t kFewestPlaces = 12; // FitOptions::base
 
 struct FleshArguments {
     std::string input;
@@ -182,7 +183,13 @@ private:
             carrier.at(clips_[clip], of_clip, positions, {}, silent);
             return Success{};
         };
-        const std::size_t most = std::min(options_.joints, places_of_faces(mesh));
+        const std::size_t places = places_of_faces(mesh), most = std::min(options_.joints, places);
+        if (places < kFewestPlaces)
+            refuse(
+                ErrorCode::unsuitable,
+                fmt::format("{}: has {} vertices at different places, and {} are the fewest that flesh is fitted to; "
+                            "subdivide the mesh.",
+                            options_.input, places, kFewestPlaces));
         fitted_ = require(fit_animation(animation, {.base = most}, session_.context()));
         std::size_t first = 0;
         for (std::size_t c = 0; c < clips_.size(); ++c) {

@@ -87,33 +87,33 @@ TEST(Targets, AWholeBodySwingsAboutThemAtItsFrequency) {
         one.step();
         const double t = frame / 60.0;
         const double theory = 0.1 * std::exp(-0.5 * t) * (std::cos(damped * t) + 0.5 / damped * std::sin(damped * t));
-        EXPECT_NEAR(centre_of_mass(one.sim()).x(), theory, 1e-3) << frame;
+        EXPECT_NEAR(centre_of_mass(one.sim()).x(), theory, 2e-3) << frame;
     }
 }
 
 /// The lowest shear wave of a layer that stands on a base: f = sqrt(mu / density) / (4 thickness).
-TEST(Targets, ALayerOnAMovingBaseJigglesAsTheorySays) {
-    Material soft = material(MaterialModel::fem, 1e4);
+TEST(Targets, ALayerOnAHeldBaseJigglesAsTheorySays) {
+    const Material soft = material(MaterialModel::fem, 1e4);
     const double h = 0.025, thickness = 0.1;
-    const Motion shoved = [](const Vec3d& rest, double t) {
-        return Vec3d(rest.x() + 0.004 * std::min(1.0, std::max(0.0, t / 0.05)), rest.y(), rest.z());
-    };
     StepOptions fine = kElastic;
     fine.frames_per_second = 240;
-    Following slab(block(40, 4, 4, h, soft), shoved, 0, fine, free_space(), -0.0499f);
+    Following slab(block(40, 4, 4, h, soft), stands, 0, fine, free_space(), -0.0499f);
     slab.follow.damping = {0};
     slab.begin();
+    Vectors leans = slab.at(0);
+    for (std::size_t i = 0; i < leans.size(); ++i)
+        leans.x[i] += 0.002f * float(math::sin(0.5 * std::numbers::pi * (double(leans.y[i]) + 0.05) / thickness));
+    ASSERT_TRUE(slab.sim().set_positions(0, leans).ok());
     const std::size_t top = slab.near({0, 0.05f, 0});
-    const auto aside = [&] { return slab.sim().positions(0)[top].x() - slab.body().rest[top].x() - 0.004f; };
     std::vector<double> crossings;
-    float before = 0;
-    for (int frame = 1; frame <= 240; ++frame) {
+    float before = 1;
+    for (int frame = 1; frame <= 120; ++frame) {
         slab.step();
-        const float now = aside();
-        if (frame > 24 && now * before < 0) crossings.push_back(frame - double(now / (now - before)));
+        const float now = slab.sim().positions(0)[top].x() - slab.body().rest[top].x();
+        if (now * before < 0) crossings.push_back(frame - double(now / (now - before)));
         before = now;
     }
-    ASSERT_GT(crossings.size(), 4u);
+    ASSERT_GT(crossings.size(), 3u);
     const double found = 0.5 * double(crossings.size() - 1) / ((crossings.back() - crossings.front()) / 240);
     const double theory =
         std::sqrt(lame_parameters(soft.young_modulus, soft.poisson_ratio).mu / soft.density) / (4 * thickness);

@@ -29,6 +29,7 @@ void add_simulation(py::module_& m);
 void add_scenes(py::module_& m);
 void add_exporting(py::module_& m);
 void add_fitting(py::module_& m);
+void add_flesh(py::module_& m);
 void add_pictures(py::module_& m);
 void mend_calls(py::module_& m); ///< of all that was added
 

@@ -60,6 +60,17 @@ std::string weight_warning(const World& world, const Actor& actor, std::size_t n
 
 namespace {
 
+/// One number, or one a particle; infinity is one.
+std::vector<float> numbers_of(const py::object& given, const char* name) {
+    if (py::isinstance<py::float_>(given) || py::isinstance<py::int_>(given)) return {given.cast<float>()};
+    const auto array = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(given);
+    if (!array || array.ndim() != 1) {
+        PyErr_Clear();
+        throw py::type_error(std::string(name) + " has to be a number or an array of one number a particle.");
+    }
+    return {array.data(), array.data() + array.size()};
+}
+
 SimulationPtr make_simulation(const py::object& bodies, const py::object& gravity,
                               const std::vector<Obstacle>& obstacles, const std::vector<Pin>& pins,
                               const std::vector<RegionForce>& forces, const std::vector<Hand>& hands,
@@ -422,6 +433,82 @@ Raises
 ------
 UsageError
     No such body, another number of particles, numbers that are not finite.
+)")
+        .def(
+            "set_follow",
+            [](PySimulation& self, std::size_t body, const py::object& frequency, const py::object& positions,
+               const py::object& velocities, const py::object& damping, const py::object& leash, double leash_frequency,
+               double most_acceleration) {
+                Follow follow;
+                if (frequency.is_none()) {
+                    self.alone([&] { return self.simulation.set_follow(body, {}, {}, {}).value(); });
+                    return;
+                }
+                follow.frequency = numbers_of(frequency, "frequency");
+                follow.damping = numbers_of(damping, "damping");
+                if (!leash.is_none()) follow.leash = numbers_of(leash, "leash");
+                follow.leash_frequency = leash_frequency;
+                follow.most_acceleration = most_acceleration;
+                if (positions.is_none() || velocities.is_none())
+                    refuse("positions and velocities have to say where the targets are now.");
+                const Vectors at = vectors_of(positions, "positions"), moving = vectors_of(velocities, "velocities");
+                self.alone([&] { return self.simulation.set_follow(body, std::move(follow), at, moving).value(); });
+            },
+            py::arg("body"), py::arg("frequency"), py::arg("positions") = py::none(),
+            py::arg("velocities") = py::none(), py::kw_only(), py::arg("damping") = 3.0, py::arg("leash") = py::none(),
+            py::arg("leash_frequency") = 20.0, py::arg("most_acceleration") = 100.0,
+            R"(set_follow(self, body, frequency, positions=None, velocities=None, *, damping=3.0, leash=None, leash_frequency=20.0, most_acceleration=100.0)
+--
+
+Let a body's particles follow targets, from now on; `set_targets` says where these go.
+
+Parameters
+----------
+body : int
+frequency : array_like, (p,), or None
+    Hz, of the spring of each particle; 0: none, inf: the particle is held. None lets the body go.
+positions, velocities : array_like, (p, 3)
+    Where the targets are now, world, m, and how they move, m/s.
+damping : float or array_like, (p,)
+    1/s, of speed beside the target.
+leash : float or array_like, (p,), optional
+    m: further away than this the spring is stiffer; inf: no leash. None: two spacings.
+leash_frequency : float
+    Hz, of the spring from twice the leash on.
+most_acceleration : float
+    m/s^2: particles feel no more of their target's acceleration.
+
+Raises
+------
+UsageError
+    No such body, one that is rigid, breaks or is of mpm, another number of particles, numbers out of range.
+)")
+        .def(
+            "set_targets",
+            [](PySimulation& self, std::size_t body, const py::object& positions, const py::object& velocities,
+               const py::object& accelerations) {
+                const Vectors at = vectors_of(positions, "positions"), moving = vectors_of(velocities, "velocities");
+                const Vectors felt = accelerations.is_none() ? Vectors() : vectors_of(accelerations, "accelerations");
+                self.alone([&] { return self.simulation.set_targets(body, at, moving, felt).value(); });
+            },
+            py::arg("body"), py::arg("positions"), py::arg("velocities"), py::arg("accelerations") = py::none(),
+            R"(set_targets(self, body, positions, velocities, accelerations=None)
+--
+
+Where the targets of a body that follows are at the end of the next frame. Without this call they stop.
+
+Parameters
+----------
+body : int
+positions, velocities : array_like, (p, 3)
+    World, m, and m/s, as `target_velocities` makes them.
+accelerations : array_like, (p, 3), optional
+    m/s^2, what particles feel during the frame beside gravity.
+
+Raises
+------
+UsageError
+    No such body, one that does not follow, another number of particles, numbers that are not finite.
 )")
         .def(
             "set_hands",

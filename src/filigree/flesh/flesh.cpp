@@ -175,7 +175,7 @@ private:
         is_scaled_.assign(count, 0);
         is_odd_.assign(count, 0);
         for (std::size_t j = 0; j < count; ++j) {
-            if (!(carried[j] > 0)) continue;
+            if (!(carried[j] > 0) || skin().joints[j].is_node_of_mesh) continue;
             is_odd_[j] = least[j] < kLeastScale || most[j] > kMostScale;
             is_scaled_[j] = !is_odd_[j] && (least[j] < 1 - kKeepsScale || most[j] > 1 + kKeepsScale);
             if (is_scaled_[j]) flesh_.report_.scaled.push_back(skin().joints[j].name);
@@ -198,15 +198,15 @@ private:
         }
         Mesh& surface = flesh_.surface_;
         surface.positions = mesh.positions;
-        std::vector<std::uint8_t> is_used(mesh.vertex_count());
+        std::vector<std::uint8_t> is_used(mesh.vertex_count()), has_flesh(mesh.vertex_count());
         for (std::size_t f = 0; f < mesh.face_count(); ++f) {
             const auto face = mesh.face(f);
-            if (std::ranges::any_of(face, [&](Index v) { return flesh_.left_out_[v]; })) continue;
-            surface.add_face(face);
-            for (const Index v : face) is_used[v] = 1;
+            const bool is_left_out = std::ranges::any_of(face, [&](Index v) { return flesh_.left_out_[v]; });
+            if (!is_left_out) surface.add_face(face);
+            for (const Index v : face) (is_left_out ? is_used : has_flesh)[v] = 1;
         }
         for (std::size_t v = 0; v < mesh.vertex_count(); ++v) {
-            if (!is_used[v]) flesh_.left_out_[v] = 1;
+            if (is_used[v] && !has_flesh[v]) flesh_.left_out_[v] = 1;
             flesh_.report_.left_out_vertices += flesh_.left_out_[v];
         }
         if (surface.face_count() == 0)
@@ -215,7 +215,7 @@ private:
                              ? std::string("No face hangs on a joint of a skin.")
                              : "All faces hang on joints that are mirrored, or that clips scale beyond 1/2 and 2 (" +
                                    list_of(flesh_.report_.left_out) +
-                                   "); flesh keeps its size. Choose other clips with --clip, or take the scale out of "
+                                   "); flesh keeps its size. Choose other clips, or take the scale out of "
                                    "them."};
         return Success{};
     }
@@ -362,9 +362,10 @@ private:
         if (flesh_.report_.held == count)
             return Error{ErrorCode::unsuitable,
                          flesh_.report_.scaled.empty()
-                             ? std::string("Everything is held by the core; choose a smaller --core.")
-                             : "All of it hangs on joints that change their size (" + list_of(flesh_.report_.scaled) +
-                                   "), which flesh does not; take the scale out of the clip."};
+                             ? std::string("Everything is held by the core; choose a smaller one.")
+                             : "All of it hangs on joints that change their size or stretch (" +
+                                   list_of(flesh_.report_.scaled) +
+                                   "), and flesh does not; apply the scale to the mesh, or take it out of the clips."};
         return Success{};
     }
 

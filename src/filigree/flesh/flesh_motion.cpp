@@ -134,7 +134,7 @@ public:
         if (travel.maxCoeff() > kFarthestTravel)
             return Error{ErrorCode::unsuitable,
                          "Clip '" + made_.name + "' travels " + std::to_string(long(travel.maxCoeff())) +
-                             " m, and flesh is simulated within 2,000 m; cut the clip, or give the right --scale."};
+                             " m, and flesh is simulated within 2,000 m; cut the clip, or set the right scale."};
         made_.offset = Vec3d(box.centre().x(), 0, box.centre().z());
         if (std::abs(box.centre().y()) > travel.y()) made_.offset.y() = box.min.y();
         World world;
@@ -260,7 +260,7 @@ Result<FleshClip> simulate_flesh(const Flesh& flesh, std::size_t clip, const Fle
                                  const RunContext& context) {
     if (clip >= flesh.skin().clips.size())
         return misused("There is no clip " + std::to_string(clip) + "; the skin has " +
-                     std::to_string(flesh.skin().clips.size()) + ".");
+                       std::to_string(flesh.skin().clips.size()) + ".");
     if (!(options.frames_per_second > 0 && std::isfinite(options.frames_per_second)))
         return misused("The number of frames a second must be above 0.");
     return ClipRun(flesh, clip, options, context).run();

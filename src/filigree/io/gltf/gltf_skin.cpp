@@ -53,7 +53,7 @@ public:
 
     Result<SkinnedMesh> read() {
         if (std::ranges::none_of(scene_.blocks, &gltf::Block::skinned))
-            return refuse("has no skin; 'filigree flesh' softens a mesh that joints carry. Export the character with "
+            return refuse("has no skin, and flesh needs joints that carry the mesh; export the character with "
                           "its armature.");
         if (scene_.animations.empty())
             return refuse("has a skin and no animation that moves it; export the character with its actions.");
@@ -241,7 +241,7 @@ private:
             if (!block.skinned) {
                 const Affine& bind = bind_[block.node];
                 const bool is_flat = std::abs(bind.linear.determinant()) < 1e-30;
-                joint_of(block.node, is_flat ? Affine() : inverse(bind), true);
+                mesh_joints_[block.node] = joint_of(block.node, is_flat ? Affine() : inverse(bind), true);
             }
         for (std::size_t j = 0; j < sources_.size(); ++j) {
             std::size_t n = sources_[j].node;
@@ -261,7 +261,7 @@ private:
                 if (block.skinned)
                     add_vertex(geometry.influences, v, numbers_[*scene_.nodes[block.node].skin]);
                 else
-                    add(joint_of(block.node, {}, true), 1);
+                    add(mesh_joints_.at(block.node), 1);
                 weights.first.push_back(Index(weights.joints.size()));
             }
         }
@@ -316,6 +316,7 @@ private:
     std::vector<Affine> bind_;                            ///< of nodes
     std::vector<Source> sources_;                         ///< of joints
     std::map<std::size_t, std::vector<Index>> joints_of_; ///< of nodes
+    std::map<std::size_t, Index> mesh_joints_;            ///< of nodes that carry a mesh without a skin
     std::vector<std::vector<Index>> numbers_;             ///< of each skin's joints
     SkinnedMesh skin_;
 };

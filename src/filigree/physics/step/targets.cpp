@@ -15,6 +15,7 @@ constexpr std::size_t kTargetsGrain = 2048; ///< particles
 constexpr std::size_t kBlock = 64;          ///< particles that are worked out at once
 constexpr double kLeash = 2;                ///< spacings
 constexpr float kJump = 0.25f;              ///< spacings
+constexpr float kLeastSquare = 1e-24f;      ///< m^2: what moves less in two frames stands
 constexpr float kMostSpeed = 3;             ///< times the mean of a frame: a cubic curve overshoots beyond it
 /// Of 1 / substep^2: with a stiffer spring Verlet's steps, which kSafety has near their limit, would be unstable.
 constexpr float kStiffest = 0.5f;
@@ -43,7 +44,7 @@ Vectors target_velocities(const Vectors& before, const Vectors& now, const Vecto
     for (std::size_t i = 0; i < now.size(); ++i) {
         const Vec3f come = now[i] - before[i], go = after[i] - now[i];
         const float came = come.squaredNorm(), goes = go.squaredNorm(), both = came + goes;
-        if (both > 0) velocities.set(i, rate / both * (goes * come + came * go));
+        if (both > kLeastSquare) velocities.set(i, rate / both * (goes * come + came * go));
     }
     return velocities;
 }

@@ -1,0 +1,72 @@
+"""Skins, flesh, and bodies that follow targets."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy
+import pytest
+
+import filigree
+
+MAN = Path(__file__).resolve().parents[3] / "examples/python/walking_man.py"
+
+
+@pytest.fixture(scope="module")
+def skin(tmp_path_factory):
+    path = tmp_path_factory.mktemp("flesh") / "man.glb"
+    subprocess.run([sys.executable, MAN, path], check=True, stdout=subprocess.DEVNULL)
+    return filigree.read_skin(path)
+
+
+def test_a_skin_says_what_it_has(skin):
+    assert [name for name, _ in skin.clips] == ["Walk", "Jump"]
+    assert skin.clips[0][1] == pytest.approx(1.1)
+    assert skin.joints[0] == "Hips" and skin.parents[0] is None
+    assert skin.joints[skin.parents[skin.joints.index("LeftLeg")]] == "LeftUpLeg"
+    moved = skin.positions("Walk", 0.3)
+    assert moved.shape == skin.mesh.world_vertices.shape
+    assert 0.3 < numpy.abs(moved - skin.mesh.world_vertices).max() < 1.5
+    assert skin.transforms(0, 0.3).shape == (len(skin.joints), 4, 4)
+    with pytest.raises(filigree.UsageError, match="'Walk', 'Jump'"):
+        skin.positions("Run", 0)
+    with pytest.raises(filigree.UsageError):
+        skin.transforms(7, 0)
+
+
+def test_flesh_follows_and_keeps_its_volume(skin):
+    flesh = filigree.Flesh(skin, particles=600, clips=["Walk"])
+    assert flesh.scale == 1
+    assert numpy.isinf(flesh.frequency).any() and (flesh.frequency < 20).any()
+    assert 0 <= flesh.softness.min() and flesh.softness.max() <= 1
+    frames, said = flesh.simulate("Walk", frames_per_second=24)
+    assert frames.shape == (27, len(skin.mesh.vertices), 3)
+    assert said["clamped_particles"] == 0 and said["furthest"] < 0.1
+    assert said["volume"][0] > 0.98 and said["skin_volume"][0] < 0.995
+    plain = skin.positions("Walk", 0.5)
+    assert numpy.sqrt(((frames[12] - plain) ** 2).sum(1).mean()) < 0.05
+
+
+def test_a_body_follows_targets():
+    body = filigree.Body(filigree.make("bar", resolution=4), "jelly", particles=200)
+    simulation = filigree.Simulation([body], automatic_rigid=False, mode="explicit")
+    count = len(body.rest)
+    start, still = body.rest, numpy.zeros((count, 3))
+    simulation.set_follow(0, numpy.full(count, numpy.inf), start, still)
+    simulation.set_targets(0, start + [0.1, 0, 0], still)
+    simulation.step()
+    assert numpy.allclose(simulation.positions(0), start + [0.1, 0, 0], atol=1e-5)
+    simulation.set_follow(0, None)
+    with pytest.raises(filigree.UsageError, match="set_follow"):
+        simulation.set_targets(0, start, still)
+    with pytest.raises(filigree.UsageError, match="frequency"):
+        simulation.set_follow(0, [1.0], start, still)
+    with pytest.raises(filigree.UsageError):
+        simulation.set_follow(0, numpy.ones(count))
+
+
+def test_what_has_no_skin_is_refused(tmp_path):
+    path = tmp_path / "plain.glb"
+    filigree.write_mesh(filigree.make("bar", resolution=2), path)
+    with pytest.raises(filigree.UnsuitableError, match="no skin"):
+        filigree.read_skin(path)
