@@ -1,0 +1,72 @@
+// `filigree flesh`: from a skin to a skin, and what it refuses.
+#include "apps/program.h"
+#include "flesh/skinned_gltf.h"
+
+#include "filigree/file.h"
+#include "filigree/io/gltf/gltf.h"
+#include "filigree/io/system/file.h"
+
+using namespace filigree_test;
+using namespace filigree;
+
+namespace {
+
+class FleshCommand : public Program {
+protected:
+    void SetUp() override { ASSERT_TRUE(write_file(path("tube.gltf"), skinned_tube()).ok()); }
+    const std::vector<std::string> few_ = {"--particles", "300", "--no-check", "--frame-rate", "30"};
+    std::vector<std::string> flesh(std::vector<std::string> more) const {
+        more.insert(more.begin(), "flesh");
+        more.insert(more.end(), few_.begin(), few_.end());
+        return more;
+    }
+};
+
+} // namespace
+
+TEST_F(FleshCommand, ASkinBecomesASkinThatPlays) {
+    const Json said = json(flesh({"tube.gltf", "-o", "soft.glb", "--joints", "40"}));
+    ASSERT_EQ(said["clips"].size(), 1u); // a single pose is left out
+    EXPECT_EQ(said["clips"][0]["name"], "Bend");
+    EXPECT_EQ(said["clips"][0]["frames"], 31);
+    EXPECT_EQ(said["clips"][0]["clamped_particles"], 0);
+    EXPECT_GT(double(said["clips"][0]["volume"][0]), double(said["clips"][0]["skin_volume"][0]));
+    EXPECT_EQ(said["scale"], 1);
+    EXPECT_LT(double(said["fit_rms"]), 5e-3);
+    ASSERT_EQ(said["warnings"].size(), 1u);
+    EXPECT_NE(std::string(said["warnings"][0]).find("'Still'"), std::string::npos);
+    const GltfScene scene = GltfScene::read(path("soft.glb"), RunContext()).value();
+    ASSERT_EQ(scene.animations().size(), 1u);
+    EXPECT_EQ(scene.animations()[0].name, "Bend");
+    EXPECT_NEAR(scene.animations()[0].last_key, 1, 1e-6);
+    // Its end is near the plain skin's.
+    const GltfScene plain = GltfScene::read(path("tube.gltf"), RunContext()).value();
+    std::vector<Vec3f> soft(scene.mesh().vertex_count()), skin(plain.mesh().vertex_count());
+    ASSERT_EQ(soft.size(), skin.size());
+    ASSERT_TRUE(scene.positions(0, 1, soft, RunContext()).ok());
+    ASSERT_TRUE(plain.positions(0, 1, skin, RunContext()).ok());
+    double sum = 0;
+    for (std::size_t v = 0; v < soft.size(); ++v) sum += double((soft[v] - skin[v]).squaredNorm());
+    EXPECT_LT(std::sqrt(sum / double(soft.size())), 0.05);
+}
+
+TEST_F(FleshCommand, OneClipBecomesAModel) {
+    const Json said = json(flesh({"tube.gltf", "-o", "soft.fil", "--clip", "Bend", "--loop"}));
+    EXPECT_EQ(said["clips"][0]["is_loop"], true);
+    const PoseSequence poses = read_poses(path("soft.fil")).value();
+    ASSERT_EQ(poses.frames.size(), 31u);
+    EXPECT_EQ(poses.frames.front().positions, poses.frames.back().positions);
+}
+
+TEST_F(FleshCommand, SaysWhatIsWrong) {
+    const auto sentence = [&](std::vector<std::string> arguments) { return run(flesh(std::move(arguments))).err; };
+    EXPECT_NE(sentence({"tube.gltf", "-o", "x.glb", "--clip", "Run"}).find("no clip 'Run', but 'Bend', 'Still'"),
+              std::string::npos);
+    EXPECT_NE(sentence({"tube.gltf", "-o", "x.glb", "--clip", "Still"}).find("single pose"), std::string::npos);
+    EXPECT_NE(sentence({"tube.gltf", "-o", "x.glb", "--soft", "Tail*"}).find("'upper', 'lower'"), std::string::npos);
+    EXPECT_NE(sentence({"tube.gltf", "-o", "tube.gltf"}).find("tube.gltf"), std::string::npos);
+    EXPECT_NE(sentence({"tube.gltf", "-o", "x.glb", "-o", "x.glb"}).find("one place"), std::string::npos);
+    EXPECT_FALSE(std::filesystem::exists(path("x.glb")));
+    ASSERT_TRUE(write_mesh(make_cylinder(), path("plain.glb")).ok());
+    EXPECT_NE(sentence({"plain.glb", "-o", "x.glb"}).find("no skin"), std::string::npos);
+}
