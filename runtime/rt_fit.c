@@ -1027,3 +1027,20 @@ void flg_fit_gradients(const flg_fit* fit, const float* positions, uint32_t begi
         complete(gradient, fit->flatness + v);
     }
 }
+
+#ifdef FLG_WITH_FIT_TERMS
+void flg_fit_terms_of(const flg_fit* fit, uint32_t vertex, flg_fit_terms* out) {
+    const flg_terms* terms = fit->terms + vertex;
+    const flg_flatness* flatness = fit->flatness + vertex;
+    out->count = terms->count;
+    for (uint32_t j = 0; j < terms->count; ++j) {
+        out->vertices[j] = terms->vertices[j];
+        for (int k = 0; k < 3; ++k) out->weights[j][k] = terms->weights[j][k];
+    }
+    memcpy(out->constant, fit->rest_error + 9 * (size_t)vertex, sizeof out->constant);
+    memcpy(out->line, flatness->line, sizeof out->line);
+    memcpy(out->normal, flatness->normal, sizeof out->normal);
+    out->beside_line = flatness->beside_line;
+    out->off_plane = flatness->off_plane;
+}
+#endif

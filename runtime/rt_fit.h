@@ -52,6 +52,20 @@ FLG_SHARED void flg_fit_free(flg_fit* fit);
 FLG_SHARED void flg_fit_gradients(const flg_fit* fit, const float* positions, uint32_t begin, uint32_t end,
                                   float* gradients);
 
+#ifdef FLG_WITH_FIT_TERMS /* libfiligree alone, which hands them out as matrices */
+enum { FLG_MOST_FIT_TERMS = 32 };
+/* A vertex's gradient before what is flat is completed: constant + the sum of (c_j' - c_i') weights[j]^T. */
+typedef struct flg_fit_terms {
+    double weights[FLG_MOST_FIT_TERMS][3];
+    uint32_t vertices[FLG_MOST_FIT_TERMS];
+    uint32_t count;
+    float constant[9];            /* column by column */
+    float line[3], normal[3];     /* directions in which the neighbours spread most, and least */
+    float beside_line, off_plane; /* share of what is completed across `line`, and along `normal`: 0 to 1 */
+} flg_fit_terms;
+FLG_SHARED void flg_fit_terms_of(const flg_fit* fit, uint32_t vertex, flg_fit_terms* terms);
+#endif
+
 /* Unit normals, 3 floats a vertex: the sum of its faces' area vectors; zero without a face of positive area. sums: 3
  * doubles a vertex of scratch memory. */
 FLG_SHARED void flg_vertex_normals(const float* positions, size_t count, const flg_faces* faces, double* sums,

@@ -1,7 +1,7 @@
 """Takes detail off a mesh, lets anything move what is left, puts the detail back.
 
 The names are those of the program and of C++; docs/python.md is the way in. Whatever takes a mesh takes objects with
-vertices and faces (trimesh) or triangles (Open3D) as well; arrays may be of any dtype, order and strides.
+vertices and faces (trimesh) or triangles (Open3D) and tuples (V, F) as well; arrays may be of any dtype, order and strides.
 
 >>> import filigree
 >>> model = filigree.strip(filigree.make("wavy-sphere"))
@@ -87,19 +87,43 @@ from ._core import (
     write_model,
     write_picture,
 )
+from . import _geometry, _matrices, _notebook
+from ._geometry import (
+    ClosestPoints,
+    adjacency,
+    areas,
+    boundary,
+    closest_points,
+    concatenate,
+    edges,
+    face_normals,
+    normals,
+    signed_distance,
+    split,
+    volume,
+    winding_numbers,
+)
+from ._matrices import Bindings, GradientOperator, PoseDerivative, SparseMatrix, rest_pose
+from ._notebook import View, plot
 from ._version import __version__ as __version__
+
+for _part in (_geometry, _matrices, _notebook):
+    _part.put_onto_classes()
 
 __all__ = [
     "Actor",
     "Attachment",
     "BadFileError",
+    "Bindings",
     "Body",
     "Cancelled",
+    "ClosestPoints",
     "Error",
     "FiligreeWarning",
     "Flesh",
     "Force",
     "FracturedMesh",
+    "GradientOperator",
     "Hand",
     "HandleRegion",
     "HandleSolver",
@@ -114,6 +138,7 @@ __all__ = [
     "OutOfMemoryError",
     "Pin",
     "Pose",
+    "PoseDerivative",
     "PoseSequence",
     "ReferenceModel",
     "Restorer",
@@ -121,26 +146,37 @@ __all__ = [
     "SceneRun",
     "Simulation",
     "Skin",
+    "SparseMatrix",
     "UnsuitableError",
     "UnsupportedError",
     "UnwritableError",
     "UsageError",
+    "View",
     "Warp",
+    "adjacency",
+    "areas",
     "bend",
+    "boundary",
     "chain",
+    "closest_points",
     "compare",
+    "concatenate",
     "contains",
     "distances_to_surface",
     "edge_strains",
+    "edges",
     "expected_error",
     "export",
+    "face_normals",
     "fit",
     "fracture",
     "info",
     "make",
     "materials",
     "move_by_handles",
+    "normals",
     "pack",
+    "plot",
     "rbf",
     "read_handles",
     "read_mesh",
@@ -150,9 +186,12 @@ __all__ = [
     "read_skin",
     "remesh",
     "render",
+    "rest_pose",
     "restore",
     "sample",
+    "signed_distance",
     "smooth_random",
+    "split",
     "squeeze",
     "stretch",
     "strip",
@@ -161,6 +200,8 @@ __all__ = [
     "target_velocities",
     "twist",
     "vertex_distances",
+    "volume",
+    "winding_numbers",
     "write_animation",
     "write_mesh",
     "write_model",

@@ -30,6 +30,8 @@ void add_scenes(py::module_& m);
 void add_exporting(py::module_& m);
 void add_fitting(py::module_& m);
 void add_flesh(py::module_& m);
+void add_matrices(py::module_& m);
+void add_geometry(py::module_& m);
 void add_pictures(py::module_& m);
 void mend_calls(py::module_& m); ///< of all that was added
 

@@ -222,24 +222,73 @@ MeshPtr mesh_of_state(const py::tuple& state) {
 
 } // namespace
 
+namespace {
+
+const char* faces_word(const py::handle& given) {
+    for (const char* word : {"faces", "triangles"})
+        if (py::hasattr(given, "vertices") && py::hasattr(given, word)) return word;
+    return nullptr;
+}
+
+/// (V, F): a tuple of two, of which the second has rows of whole numbers.
+bool is_pair(const py::handle& given) {
+    if (!py::isinstance<py::tuple>(given) || PyTuple_GET_SIZE(given.ptr()) != 2) return false;
+    const auto pair = py::reinterpret_borrow<py::tuple>(given);
+    for (const py::handle part : pair)
+        if (py::isinstance<Mesh>(part) || faces_word(part)) return false; // two meshes
+    const py::array vertices = py::array::ensure(pair[0]);
+    if (!vertices || vertices.ndim() != 2) return false;
+    PyErr_Clear();
+    const py::array faces = py::array::ensure(pair[1]);
+    PyErr_Clear(); // polygons of several sizes are no array
+    const bool is_list = py::isinstance<py::list>(pair[1]) && py::len(pair[1]) > 0 &&
+                         py::isinstance<py::sequence>(py::reinterpret_borrow<py::list>(pair[1])[0]);
+    if (!faces || faces.dtype().kind() == 'O') return is_list;
+    return faces.ndim() == 2 && (faces.dtype().kind() == 'i' || faces.dtype().kind() == 'u' || faces.shape(0) == 0);
+}
+
+} // namespace
+
+bool is_mesh_like(const py::handle& given) {
+    return py::isinstance<Mesh>(given) || faces_word(given) || is_pair(given);
+}
+
 MeshPtr mesh_of(const py::handle& given, const char* name) {
     if (py::isinstance<Mesh>(given)) return given.cast<MeshPtr>();
-    const char* faces = py::hasattr(given, "faces") ? "faces" : "triangles";
-    if (!py::hasattr(given, "vertices") || !py::hasattr(given, faces))
-        throw py::type_error(std::string(name) +
-                             " has to be a filigree.Mesh, or an object that has vertices and faces " +
-                             "or triangles; this is of type " + Py_TYPE(given.ptr())->tp_name + ".");
-    return make_mesh(given.attr("vertices"), given.attr(faces), py::none(), py::none(), py::none(), py::none(),
-                     py::none(), py::none(), {});
+    const auto made = [](const py::object& vertices, const py::object& faces) {
+        return make_mesh(vertices, faces, py::none(), py::none(), py::none(), py::none(), py::none(), py::none(), {});
+    };
+    if (const char* faces = faces_word(given)) return made(given.attr("vertices"), given.attr(faces));
+    if (is_pair(given)) {
+        const auto pair = py::reinterpret_borrow<py::tuple>(given);
+        return made(pair[0], pair[1]);
+    }
+    throw py::type_error(std::string(name) +
+                         " has to be a filigree.Mesh, a tuple (V, F), or an object that has vertices and " +
+                         "faces or triangles; this is of type " + Py_TYPE(given.ptr())->tp_name + ".");
 }
 
 void warn_of_turns(const OutwardReport& outward) {
     if (const std::string sentence = outward_sentence(outward); !sentence.empty()) warn({sentence});
 }
 
+std::vector<Vec3d> world_points_of(const py::handle& given) {
+    std::vector<Vec3d> points;
+    const auto add = [&](const Mesh& mesh) {
+        for (std::size_t i = 0; i < mesh.vertex_count(); ++i) points.push_back(mesh.world_position(i));
+    };
+    if (py::isinstance<PyModel>(given))
+        add(given.cast<const PyModel&>().model->mesh);
+    else if (is_mesh_like(given))
+        add(*mesh_of(given, "box"));
+    else
+        points = double_points_of(given, "box");
+    return points;
+}
+
 Box box_of(const py::handle& given) {
     if (py::isinstance<PyModel>(given)) return world_bounds(given.cast<const PyModel&>().model->mesh);
-    if (py::hasattr(given, "vertices")) return world_bounds(*mesh_of(given, "box"));
+    if (is_mesh_like(given)) return world_bounds(*mesh_of(given, "box"));
     Box box;
     for (const Vec3d& point : double_points_of(given, "box")) box.extend(point);
     if (box.empty()) refuse("box has to hold a point.");

@@ -38,7 +38,7 @@ struct Subject {
 
 Subject subject_of(const py::handle& given) {
     if (py::isinstance<PyModel>(given)) return {finest_mesh(model_of(given))};
-    if (py::hasattr(given, "vertices")) return {mesh_of(given)};
+    if (is_mesh_like(given)) return {mesh_of(given)};
     auto points = std::make_shared<Mesh>();
     split_origin(double_points_of(given, "points"), *points);
     return {points};
@@ -69,7 +69,7 @@ py::array_t<std::uint8_t> render(const py::object& what, unsigned width, unsigne
                                  const std::string& map, unsigned passes, unsigned threads,
                                  const py::object& progress) {
     std::vector<Subject> subjects;
-    if (py::isinstance<py::list>(what) || py::isinstance<py::tuple>(what))
+    if (py::isinstance<py::list>(what) || (py::isinstance<py::tuple>(what) && !is_mesh_like(what)))
         for (const py::handle one : what) subjects.push_back(subject_of(one));
     else
         subjects.push_back(subject_of(what));

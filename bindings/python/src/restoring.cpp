@@ -1,6 +1,9 @@
 #include "models.h"
 
+#include <filigree/blend/restore_adjoint.h>
 #include <filigree/restore.h>
+
+#include <mutex>
 
 namespace filigree::python {
 
@@ -11,6 +14,12 @@ struct PyRestorer {
     PyModel model;
     RestoreOptions options;
     Restorer restorer;
+    /// Made when it is asked for first.
+    struct Adjoint {
+        std::once_flag made;
+        std::optional<RestoreAdjoint> adjoint;
+    };
+    std::shared_ptr<Adjoint> adjoint = std::make_shared<Adjoint>();
 
     PyRestorer(PyModel of, const RestoreOptions& how)
         : model(std::move(of)), options(how),
@@ -42,6 +51,18 @@ MeshPtr restore_mesh(const PyRestorer& self, const py::object& pose, const py::o
     const Pose moved = pose_of(pose, gradients);
     const RunContext& context = short_context(threads);
     return without_interpreter([&] { return std::make_shared<Mesh>(self.restorer.mesh(moved, context).value()); });
+}
+
+py::tuple adjoint_of(const PyRestorer& self, const py::object& given, unsigned threads) {
+    const std::vector<Vec3f> vertices = points_of(given, "vertices");
+    const RunContext& context = short_context(threads);
+    PoseDerivative derivative = without_interpreter([&] {
+        std::call_once(self.adjoint->made, [&] {
+            self.adjoint->adjoint = RestoreAdjoint::create(*self.model.model, self.options.level, RunContext()).value();
+        });
+        return self.adjoint->adjoint->apply(vertices, context).value();
+    });
+    return py::make_tuple(take(std::move(derivative.positions)), take(std::move(derivative.gradients)));
 }
 
 py::dict expect_error(const PyModel& self, const py::object& pose, unsigned threads) {
@@ -148,6 +169,7 @@ Parameters and errors are those of `positions`.
 
 The gradients that a pose is restored with, float32 (d, 3, 3): its own, or estimated from its positions.
 )")
+        .def("_adjoint", &adjoint_of, py::arg("vertices"), py::arg("threads") = 0)
         .def_property_readonly(
             "model", [](const PyRestorer& self) { return self.model; }, "The model it restores.")
         .def_property_readonly(

@@ -54,7 +54,7 @@ def test_what_is_right_stays():
 
 
 def classes():
-    return [value for value in vars(filigree).values()
+    return [value for value in vars(filigree._core).values()
             if isinstance(value, type) and not issubclass(value, (Exception, Warning))]
 
 

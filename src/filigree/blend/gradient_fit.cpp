@@ -2,6 +2,7 @@
 
 #include "filigree/core/parallel_for.h"
 
+#define FLG_WITH_FIT_TERMS
 #include "runtime/rt_fit.h"
 
 #include <algorithm>
@@ -36,6 +37,22 @@ std::vector<Mat3f> GradientFit::fit(std::span<const Vec3f> positions, const RunC
                           gradients.front().data());
     });
     return gradients;
+}
+
+GradientFit::Terms GradientFit::terms(Index vertex) const {
+    flg_fit_terms found;
+    flg_fit_terms_of(fit_.get(), vertex, &found);
+    Terms terms;
+    for (std::uint32_t j = 0; j < found.count; ++j) {
+        terms.vertices.push_back(found.vertices[j]);
+        terms.weights.push_back({found.weights[j][0], found.weights[j][1], found.weights[j][2]});
+    }
+    terms.constant = Eigen::Map<const Mat3f>(found.constant);
+    terms.line = Eigen::Map<const Vec3f>(found.line);
+    terms.normal = Eigen::Map<const Vec3f>(found.normal);
+    terms.beside_line = found.beside_line;
+    terms.off_plane = found.off_plane;
+    return terms;
 }
 
 } // namespace filigree

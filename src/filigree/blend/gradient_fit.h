@@ -26,12 +26,24 @@ namespace filigree {
 /// identity.
 class GradientFit {
 public:
+    /// What a gradient is made of before directions without neighbours are completed: constant + the sum over
+    /// neighbours of (c_j' - c_i') weight_j^T.
+    struct Terms {
+        std::vector<Index> vertices;
+        std::vector<Vec3d> weights;
+        Mat3f constant;
+        Vec3f line, normal;           ///< in which the neighbours spread most, and least
+        float beside_line, off_plane; ///< share of what is completed across `line`, and along `normal`: 0 to 1
+    };
+
     /// driver: the driver at rest, not checked. Cost O(V) solves of 36 unknowns, and O(V log V) for the neighbours.
     GradientFit(const Mesh& driver, const RunContext& context);
 
     /// One gradient a vertex of the driver, whose vertices are now at `positions`. Cost O(V); same bytes for any thread
     /// count.
     std::vector<Mat3f> fit(std::span<const Vec3f> positions, const RunContext& context) const;
+
+    Terms terms(Index vertex) const; ///< of a vertex of the driver
 
 private:
     struct Free {

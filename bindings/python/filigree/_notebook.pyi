@@ -1,0 +1,13 @@
+from os import PathLike
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+class View:
+    def __init__(self, vertices: ArrayLike, triangles: ArrayLike, colors: ArrayLike, title: str) -> None: ...
+    def save(self, path: str | PathLike[str]) -> None: ...
+
+def plot(
+    mesh: Any, *, scalars: ArrayLike | None = None, color: ArrayLike | None = None, title: str | None = None
+) -> View: ...
+def put_onto_classes() -> None: ...
