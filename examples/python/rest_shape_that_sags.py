@@ -13,7 +13,7 @@ import filigree
 
 scan = filigree.make("cylinder", resolution=16, length=5, size=0.06)  # 0.3 m long, along x
 gravity = numpy.array([0, -9.81, 0])
-jelly = filigree.Material("jelly", young_modulus=3e4)
+jelly = filigree.Material("jelly", young_modulus=1.5e6)
 
 
 def equilibrium(rest):
@@ -52,7 +52,8 @@ axes[0].plot(*rest[:, :2].T, ".", color="C0", markersize=2, label="rest shape fo
 axes[0].set_aspect("equal")
 axes[0].set_xlabel("x, m")
 axes[0].set_ylabel("y, m")
-axes[0].legend(frameon=False, markerscale=5)
+axes[0].set_ylim(-0.07, 0.13)
+axes[0].legend(frameon=False, markerscale=5, loc="upper left")
 axes[1].semilogy(range(len(misses)), 1000 * numpy.array(misses), "o-")
 axes[1].set_xlabel("round")
 axes[1].set_ylabel("largest distance from the scan, mm")

@@ -57,7 +57,7 @@ gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, ids, gl.STATIC_DRAW);
 gl.enable(gl.DEPTH_TEST);
 gl.clearColor(1, 1, 1, 1);
 const at = name => gl.getUniformLocation(program, name);
-let turn = %(turn)s, shift = [0, 0, -3.4];
+let turn = %(turn)s, shift = [0, 0, -2.6];
 const times = (a, b) => [
   a[3]*b[0] + a[0]*b[3] + a[1]*b[2] - a[2]*b[1], a[3]*b[1] - a[0]*b[2] + a[1]*b[3] + a[2]*b[0],
   a[3]*b[2] + a[0]*b[1] - a[1]*b[0] + a[2]*b[3], a[3]*b[3] - a[0]*b[0] - a[1]*b[1] - a[2]*b[2]];

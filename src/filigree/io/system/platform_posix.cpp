@@ -3,6 +3,7 @@
 #include "filigree/io/system/platform.h"
 
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <random>
@@ -175,9 +176,12 @@ std::uint64_t random_bits() {
 #if defined(__linux__)
     std::uint64_t bits = 0;
     if (::getrandom(&bits, sizeof bits, 0) == ssize_t{sizeof bits}) return bits;
-#endif
+    // Kernels before 3.17. Not std::random_device, for which libstdc++ asks glibc 2.36: wheels run with older ones.
+    return std::uint64_t(std::chrono::steady_clock::now().time_since_epoch().count()) << 20 ^ std::uint64_t(::getpid());
+#else
     std::random_device device;
     return std::uint64_t{device()} << 32 | device();
+#endif
 }
 
 std::uint64_t memory() {
