@@ -87,7 +87,7 @@ from ._core import (
     write_model,
     write_picture,
 )
-from . import _geometry, _matrices, _notebook
+from . import _geometry, _matrices, _notebook, _results
 from ._geometry import (
     ClosestPoints,
     adjacency,
@@ -105,9 +105,10 @@ from ._geometry import (
 )
 from ._matrices import Bindings, GradientOperator, PoseDerivative, SparseMatrix, rest_pose
 from ._notebook import View, plot
+from ._results import Fitted, Momentum, Remeshed, Warped
 from ._version import __version__ as __version__
 
-for _part in (_geometry, _matrices, _notebook):
+for _part in (_geometry, _matrices, _notebook, _results):
     _part.put_onto_classes()
 
 __all__ = [
@@ -120,6 +121,7 @@ __all__ = [
     "ClosestPoints",
     "Error",
     "FiligreeWarning",
+    "Fitted",
     "Flesh",
     "Force",
     "FracturedMesh",
@@ -133,6 +135,7 @@ __all__ = [
     "Mesh",
     "MismatchError",
     "Model",
+    "Momentum",
     "NotFoundError",
     "Obstacle",
     "OutOfMemoryError",
@@ -141,6 +144,7 @@ __all__ = [
     "PoseDerivative",
     "PoseSequence",
     "ReferenceModel",
+    "Remeshed",
     "Restorer",
     "RigidMotion",
     "SceneRun",
@@ -153,6 +157,7 @@ __all__ = [
     "UsageError",
     "View",
     "Warp",
+    "Warped",
     "adjacency",
     "areas",
     "bend",

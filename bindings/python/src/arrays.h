@@ -65,6 +65,12 @@ py::array_t<Number> take(std::vector<Number>&& values) {
 py::array_t<float> array_of(const Vectors& vectors);
 py::array_t<double> array_of(const Vec3d& vector);
 
+/// A named tuple of filigree/_results.py.
+template <class... Fields>
+py::object named_result(const char* name, Fields&&... fields) {
+    return py::module_::import("filigree._results").attr(name)(std::forward<Fields>(fields)...);
+}
+
 /// A read-only look at memory that `owner` keeps.
 template <class Number>
 py::array view(const Number* data, const Shape& shape, const py::handle& owner, const Shape& strides = {}) {

@@ -67,9 +67,9 @@ py::dict said_of(const FitReport& report) {
     return said;
 }
 
-py::tuple fit(const py::object& given, const py::object& positions, double error, std::optional<double> max_error,
-              std::optional<std::size_t> base, const py::object& rest_frame, double frames_per_second, unsigned threads,
-              const py::object& progress) {
+py::object fit(const py::object& given, const py::object& positions, double error, std::optional<double> max_error,
+               std::optional<std::size_t> base, const py::object& rest_frame, double frames_per_second,
+               unsigned threads, const py::object& progress) {
     if (!(frames_per_second > 0)) refuse("frames_per_second has to be above 0.");
     const Frames frames(mesh_of(given), positions);
     const MeshAnimation animation{frames.mesh.get(), frames.count, frames_per_second,
@@ -84,7 +84,7 @@ py::tuple fit(const py::object& given, const py::object& positions, double error
         return fit_animation(animation, options, context).value();
     });
     PyModel model{std::make_shared<const Model>(std::move(fitted.model)), said_of(fitted.report)};
-    return py::make_tuple(std::move(model), std::move(fitted.poses));
+    return named_result("Fitted", std::move(model), std::move(fitted.poses));
 }
 
 } // namespace
@@ -121,7 +121,8 @@ frames_per_second : float
 
 Returns
 -------
-tuple of Model and PoseSequence
+Fitted
+    model and poses, which unpack.
 
 Raises
 ------

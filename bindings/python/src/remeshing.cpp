@@ -72,9 +72,9 @@ py::dict said_of(const QuadRemeshReport& report, std::size_t quads) {
     return said;
 }
 
-py::tuple remesh(const py::object& given, std::size_t quads, std::optional<unsigned> levels, double feature_angle,
-                 const std::string& small_parts, const std::string& wrap, std::optional<double> max_distance,
-                 bool attributes, unsigned threads, const py::object& progress) {
+py::object remesh(const py::object& given, std::size_t quads, std::optional<unsigned> levels, double feature_angle,
+                  const std::string& small_parts, const std::string& wrap, std::optional<double> max_distance,
+                  bool attributes, unsigned threads, const py::object& progress) {
     const MeshPtr mesh = mesh_of(given);
     QuadRemeshOptions options{.quads = quads,
                               .levels = levels,
@@ -89,7 +89,7 @@ py::tuple remesh(const py::object& given, std::size_t quads, std::optional<unsig
         [=](const RunContext& context) { return quad_remesh(*mesh, options, context).value(); });
     py::dict said = said_of(made.report, made.mesh.face_count());
     said["base"] = std::make_shared<Mesh>(base_mesh(made));
-    return py::make_tuple(std::make_shared<Mesh>(std::move(made.mesh)), said);
+    return named_result("Remeshed", std::make_shared<Mesh>(std::move(made.mesh)), said);
 }
 
 } // namespace

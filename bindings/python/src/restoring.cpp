@@ -3,6 +3,7 @@
 #include <filigree/blend/restore_adjoint.h>
 #include <filigree/restore.h>
 
+#include <cmath>
 #include <mutex>
 
 namespace filigree::python {
@@ -54,7 +55,10 @@ MeshPtr restore_mesh(const PyRestorer& self, const py::object& pose, const py::o
 }
 
 py::tuple adjoint_of(const PyRestorer& self, const py::object& given, unsigned threads) {
-    const std::vector<Vec3f> vertices = points_of(given, "vertices");
+    const Numbers<float> numbers = floats_of(given, "vertices"); // not copied where it is so already
+    if (numbers.ndim() != 2 || numbers.shape(1) != 3) refuse("vertices has to be of shape (n, 3).");
+    const std::span<const Vec3f> vertices(reinterpret_cast<const Vec3f*>(numbers.data()),
+                                          static_cast<std::size_t>(numbers.shape(0)));
     const RunContext& context = short_context(threads);
     PoseDerivative derivative = without_interpreter([&] {
         std::call_once(self.adjoint->made, [&] {
@@ -62,6 +66,9 @@ py::tuple adjoint_of(const PyRestorer& self, const py::object& given, unsigned t
         });
         return self.adjoint->adjoint->apply(vertices, context).value();
     });
+    float sum = 0; // one number that is not finite makes the sum so, as every vertex hangs on something
+    for (const Vec3f& position : derivative.positions) sum += 0 * position.sum();
+    if (sum != 0 || std::isnan(sum)) refuse("vertices has numbers that are not finite, or too large for 32 bits.");
     return py::make_tuple(take(std::move(derivative.positions)), take(std::move(derivative.gradients)));
 }
 

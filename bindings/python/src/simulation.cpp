@@ -615,7 +615,7 @@ Attachment
             "momentum",
             [](PySimulation& self) {
                 const Momentum momentum = self.alone([&] { return self.simulation.momentum(); });
-                return py::make_tuple(array_of(momentum.linear), array_of(momentum.angular));
+                return named_result("Momentum", array_of(momentum.linear), array_of(momentum.angular));
             },
             R"(momentum(self)
 --

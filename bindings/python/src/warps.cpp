@@ -234,7 +234,7 @@ Warp make_python_warp(const py::object& function, const py::object& gradient) {
     return warp;
 }
 
-py::tuple warp_points(const Warp& self, const py::object& given, unsigned threads) {
+py::object warp_points(const Warp& self, const py::object& given, unsigned threads) {
     const std::vector<Vec3d> points = double_points_of(given, "points");
     const std::vector<Warped> all = warped_points(self, points, true, short_context(threads));
     std::vector<Vec3d> positions(points.size());
@@ -246,7 +246,7 @@ py::tuple warp_points(const Warp& self, const py::object& given, unsigned thread
                 gradients[9 * i + static_cast<std::size_t>(3 * row + column)] = all[i].gradient(row, column);
     }
     const auto count = static_cast<py::ssize_t>(points.size());
-    return py::make_tuple(take(std::move(positions)), take<double>(std::move(gradients), Shape{count, 3, 3}));
+    return named_result("Warped", take(std::move(positions)), take<double>(std::move(gradients), Shape{count, 3, 3}));
 }
 
 /// The warp for points that are known beforehand.

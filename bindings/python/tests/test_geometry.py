@@ -150,3 +150,19 @@ def test_pages_and_cards(tmp_path):
     assert "<iframe" in mesh.plot()._repr_html_()
     with pytest.raises(filigree.MismatchError, match="scalars"):
         filigree.plot(mesh, scalars=[1, 2])
+
+
+def test_results_have_names_and_unpack():
+    mesh = filigree.make("wavy-sphere", resolution=10)
+    frames = numpy.stack([mesh.world_vertices, 1.1 * mesh.world_vertices])
+    fitted = filigree.fit(mesh, frames, error=1e-2)
+    model, poses = fitted
+    assert fitted.model is model and len(fitted.poses) == len(poses) == 2
+    remeshed = filigree.remesh(mesh, 200)
+    assert remeshed.mesh is remeshed[0] and "base" in remeshed.report
+    warped = filigree.bend(mesh, "z", 20).warp(mesh.world_vertices)
+    assert warped.positions.shape == (len(mesh), 3) and warped.gradients.shape == (len(mesh), 3, 3)
+    simulation = filigree.Simulation([filigree.Body(mesh, particles=100)])
+    assert simulation.momentum().linear.shape == (3,)
+    for thing in (simulation, filigree.Material("jelly"), filigree.Restorer(model), filigree.fracture(mesh, 3)):
+        assert repr(thing).startswith(f"<filigree.{type(thing).__name__}: ")

@@ -233,3 +233,12 @@ def test_refusals(body):
         filigree.Pose(numpy.zeros((4, 3))).stacked()
     with pytest.raises(filigree.UsageError, match="4 d"):
         filigree.Pose.from_stacked(numpy.zeros((5, 3)))
+
+
+def test_an_adjoint_of_what_is_not_finite(restorer):
+    pull = numpy.ones((len(restorer), 3))
+    pull[len(pull) // 2, 1] = numpy.nan
+    with pytest.raises(filigree.UsageError, match="not finite"):
+        restorer.adjoint(pull)
+    with pytest.raises(filigree.UsageError, match="shape"):
+        restorer.adjoint(numpy.ones(6))

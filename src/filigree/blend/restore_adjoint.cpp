@@ -5,6 +5,7 @@
 #include "filigree/core/parallel_for.h"
 #include "filigree/restore.h"
 
+#include <algorithm>
 #include <array>
 
 namespace filigree {
@@ -27,35 +28,47 @@ struct CellSum {
 /// those of its vertices.
 struct AdjointRecords {
     std::vector<std::size_t> starts = {0}; ///< of each cell, and the end
-    std::vector<Index> slots;              ///< of each vertex in the level; kNoIndex: none
+    std::vector<Index> counts;             ///< of each cell's vertices
+    std::vector<Index> slots;              ///< of each vertex in the level
     std::vector<float> u, v, x, y, z;      ///< (x, y, z) = p - o - (m - o) / 2, o the cell's first corner
+    std::size_t longest = 0;               ///< numbers of a cell
 };
 
-float sum_of(const Sixteen& lanes) {
-    float sums[kSide];
-    Lanes<kSide>::store(sums, lanes);
-    for (int step = kSide / 2; step > 0; step /= 2)
-        for (int k = 0; k < step; ++k) sums[k] += sums[k + step];
-    return sums[0];
+/// Halves are added, again and again: the same order for every width of registers.
+FILIGREE_INLINE float sum_of(Sixteen lanes) {
+    const Lanes<8>::Float eight = __builtin_shufflevector(lanes, lanes, 0, 1, 2, 3, 4, 5, 6, 7) +
+                                  __builtin_shufflevector(lanes, lanes, 8, 9, 10, 11, 12, 13, 14, 15);
+    const Lanes<4>::Float four =
+        __builtin_shufflevector(eight, eight, 0, 1, 2, 3) + __builtin_shufflevector(eight, eight, 4, 5, 6, 7);
+    return (four[0] + four[2]) + (four[1] + four[3]);
 }
 
-FILIGREE_INLINE void sum_cell(const AdjointRecords& records, std::size_t cell, const Vec3f* vertices, CellSum& sum) {
+/// gathered: room for three times the numbers of the longest cell.
+FILIGREE_INLINE void sum_cell(const AdjointRecords& records, std::size_t cell, const Vec3f* vertices, float* gathered,
+                              CellSum& sum) {
     using L = Lanes<kSide>;
-    const std::size_t begin = records.starts[cell], end = records.starts[cell + 1];
-    float gathered[kSide];
-    // A pass a coordinate: twelve sums stay in registers, where 36 would not.
-    for (std::size_t coordinate = 0; coordinate < 3; ++coordinate) {
+    const std::size_t begin = records.starts[cell], padded = records.starts[cell + 1] - begin;
+    const Index* const slots = records.slots.data() + begin;
+    const std::size_t count = records.counts[cell];
+    // All first: loads of sixteen do not wait for stores of one then.
+    float* const values[3] = {gathered, gathered + padded, gathered + 2 * padded};
+    constexpr std::size_t kAhead = 2 * kSide; // within the padding of slots
+    for (std::size_t k = 0; k < count; ++k) {
+        __builtin_prefetch(vertices + slots[k + kAhead]);
+        const Vec3f& vertex = vertices[slots[k]];
+        for (int axis = 0; axis < 3; ++axis) values[axis][k] = vertex[axis];
+    }
+    for (std::size_t k = count; k < padded; ++k)
+        for (int axis = 0; axis < 3; ++axis) values[axis][k] = 0;
+    // A pass an axis: twelve sums stay in registers, where 36 would not.
+    for (std::size_t axis = 0; axis < 3; ++axis) {
         Sixteen sums[12] = {};
-        for (std::size_t r = begin; r < end; r += kSide) {
-            for (int k = 0; k < kSide; ++k) {
-                const Index slot = records.slots[r + std::size_t(k)];
-                gathered[k] = slot == kNoIndex ? 0.0f : vertices[slot][Eigen::Index(coordinate)];
-            }
-            const Sixteen value = L::load(gathered);
-            const Sixteen u = L::load(records.u.data() + r), v = L::load(records.v.data() + r);
+        for (std::size_t r = 0; r < padded; r += kSide) {
+            const Sixteen value = L::load(values[axis] + r);
+            const Sixteen u = L::load(records.u.data() + begin + r), v = L::load(records.v.data() + begin + r);
             const Sixteen b[3] = {((1.0f - u) - v) * value, u * value, v * value};
-            const Sixteen x = L::load(records.x.data() + r), y = L::load(records.y.data() + r),
-                          z = L::load(records.z.data() + r);
+            const Sixteen x = L::load(records.x.data() + begin + r), y = L::load(records.y.data() + begin + r),
+                          z = L::load(records.z.data() + begin + r);
             for (int corner = 0; corner < 3; ++corner) {
                 sums[4 * corner] = sums[4 * corner] + b[corner];
                 sums[4 * corner + 1] = sums[4 * corner + 1] + b[corner] * x;
@@ -65,18 +78,20 @@ FILIGREE_INLINE void sum_cell(const AdjointRecords& records, std::size_t cell, c
         }
         for (std::size_t corner = 0; corner < 3; ++corner)
             for (std::size_t term = 0; term < 4; ++term)
-                sum.at[12 * corner + 4 * coordinate + term] = sum_of(sums[4 * corner + term]);
+                sum.at[12 * corner + 4 * axis + term] = sum_of(sums[4 * corner + term]);
     }
 }
 
 struct AdjointJob {
     const AdjointRecords& records;
     const Vec3f* vertices;
+    float* gathered; ///< of a thread
     std::vector<CellSum>& sums;
 };
 
 FILIGREE_INLINE void sum_cells_of(const AdjointJob& job, std::size_t begin, std::size_t end) {
-    for (std::size_t cell = begin; cell < end; ++cell) sum_cell(job.records, cell, job.vertices, job.sums[cell]);
+    for (std::size_t cell = begin; cell < end; ++cell)
+        sum_cell(job.records, cell, job.vertices, job.gathered, job.sums[cell]);
 }
 #if defined(FILIGREE_HAS_WIDTHS)
 FILIGREE_AVX512 void sum_cells_avx512(const AdjointJob& job, std::size_t begin, std::size_t end) {
@@ -178,12 +193,15 @@ Result<RestoreAdjoint> RestoreAdjoint::create(const Model& model, std::optional<
             records.y.push_back(q.y());
             records.z.push_back(q.z());
         }
+        records.counts.push_back(static_cast<Index>(records.slots.size() - records.starts.back()));
         const std::size_t padded = (records.slots.size() + kSide - 1) / kSide * kSide;
-        records.slots.resize(padded, kNoIndex);
+        records.slots.resize(padded, 0);
         for (std::vector<float>* numbers : {&records.u, &records.v, &records.x, &records.y, &records.z})
             numbers->resize(padded, 0);
+        records.longest = std::max(records.longest, padded - records.starts.back());
         records.starts.push_back(padded);
     }
+    records.slots.resize(records.slots.size() + 2 * kSide, 0); // what is asked for ahead
     content->cells_of = make_lists<CellCornerOfDriver>(driver.size(), [&](const auto& add) {
         for (Index c = 0; c < detail.cells.size(); ++c)
             for (Index k = 0; k < 3; ++k) add(detail.cells[c][k], CellCornerOfDriver{c, k});
@@ -199,9 +217,11 @@ Result<PoseDerivative> RestoreAdjoint::apply(std::span<const Vec3f> vertices, co
                                               " vertices, and the restored level has " +
                                               std::to_string(content.vertices) + "."};
     std::vector<CellSum> sums(content.cells.size());
-    const AdjointJob job{content.records, vertices.data(), sums};
-    parallel_for(context, content.cells.size(), kAdjointGrain,
-                 [&](std::size_t begin, std::size_t end) { sum_cells(job, begin, end); });
+    parallel_for(context, content.cells.size(), kAdjointGrain, [&](std::size_t begin, std::size_t end) {
+        thread_local std::vector<float> gathered;
+        gathered.resize(std::max(gathered.size(), 3 * content.records.longest));
+        sum_cells({content.records, vertices.data(), gathered.data(), sums}, begin, end);
+    });
     if (context.is_cancelled()) return cancelled_error();
 
     PoseDerivative derivative{std::vector<Vec3f>(content.driver_vertices), std::vector<Mat3f>(content.driver_vertices)};
