@@ -4,15 +4,17 @@
 AREAS = {
     "Meshes": ["Mesh", "make", "read_mesh", "write_mesh", "info"],
     "Strip and restore": ["strip", "Model", "read_model", "write_model", "pack", "Restorer", "restore", "expected_error"],
-    "Poses": ["Pose", "PoseSequence", "read_poses", "Warp", "stretch", "squeeze", "bend", "twist", "taper", "smooth_random", "rbf", "chain"],
+    "Poses": ["Pose", "PoseSequence", "read_poses", "Warp", "stretch", "squeeze", "bend", "twist", "taper", "smooth_random", "rbf", "chain", "Warped", "rest_pose", "fit", "Fitted"],
     "Handles": ["HandleSolver", "HandleRegion", "move_by_handles", "read_handles"],
     "Comparing": ["compare", "vertex_distances", "distances_to_surface", "edge_strains"],
+    "Surfaces": ["closest_points", "ClosestPoints", "signed_distance", "winding_numbers", "normals", "face_normals", "areas", "volume", "edges", "boundary", "adjacency", "split", "concatenate"],
+    "Matrices and derivatives": ["SparseMatrix", "Bindings", "GradientOperator", "PoseDerivative"],
     "Points inside": ["contains", "InsideTest", "sample"],
-    "Quads and pieces": ["remesh", "fracture", "FracturedMesh"],
+    "Quads and pieces": ["remesh", "Remeshed", "fracture", "FracturedMesh"],
     "The report's method": ["strip_reference", "ReferenceModel"],
-    "Bodies": ["Body", "Material", "materials", "Simulation", "Attachment", "Actor", "Obstacle", "Pin", "Force", "Hand", "HeatSource", "RigidMotion", "SceneRun"],
+    "Bodies": ["Body", "Material", "materials", "Simulation", "Attachment", "Actor", "Obstacle", "Pin", "Force", "Hand", "HeatSource", "RigidMotion", "Momentum", "SceneRun"],
     "Writing for other programs": ["export", "write_animation"],
-    "Pictures": ["render", "read_picture", "write_picture"],
+    "Pictures": ["render", "read_picture", "write_picture", "plot", "View"],
     "Errors": ["Error", "UsageError", "NotFoundError", "BadFileError", "UnsupportedError", "UnwritableError", "UnsuitableError", "MismatchError", "OutOfMemoryError", "Cancelled", "FiligreeWarning"],
 }
 
