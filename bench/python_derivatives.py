@@ -2,7 +2,7 @@
 """Matrices and derivatives of the Python module beside numpy and scipy doing the same, in one run.
 
 Usage: bench/python_derivatives.py [MESH] [--threads N] [--rounds N]     (build: scripts/build release python)
-Without a mesh: a wavy cube of 437,402 vertices. Each row: the library, numpy or scipy, both in ms (medians), their ratio,
+Without a mesh: a wavy cube of 437,402 vertices. Each row: the library, numpy or scipy, both in ms of a processor (medians), their ratio,
 and the largest difference of the results as a part of the largest result.
 """
 import argparse
@@ -19,9 +19,9 @@ import filigree  # noqa: E402
 
 
 def milliseconds(work):
-    start = time.perf_counter()
+    start = time.process_time()
     result = work()
-    return 1000 * (time.perf_counter() - start), result
+    return 1000 * (time.process_time() - start), result
 
 
 def compare(name, first, second, rounds):
