@@ -8,8 +8,8 @@ import xml.etree.ElementTree as tree
 from pathlib import Path
 
 # In the order in which they build on each other.
-HEADERS = ["types", "result", "context", "mesh", "strip", "pose", "restore", "pack", "file", "sample", "remesh", "reference",
-           "physics/material", "physics/body", "physics/world", "physics/simulation", "fracture", "scene", "render"]
+HEADERS = ["types", "result", "context", "mesh", "strip", "pose", "restore", "fit", "pack", "file", "sample", "remesh",
+           "reference", "physics/material", "physics/body", "physics/world", "physics/simulation", "fracture", "scene", "render"]
 DOXYFILE = """
 INPUT = {inputs}
 GENERATE_HTML = NO
