@@ -2,8 +2,8 @@
 """Matrices and derivatives of the Python module beside numpy and scipy doing the same, in one run.
 
 Usage: bench/python_derivatives.py [MESH] [--threads N] [--rounds N]     (build: scripts/build release python)
-Without a mesh: a wavy cube of 437,402 vertices. Each row: the library, numpy or scipy, both in ms of a processor (medians), their ratio,
-and the largest difference of the results as a part of the largest result.
+Without a mesh: a wavy cube of 437,402 vertices. Each row: the library, numpy or scipy, both in ms of a processor (medians),
+their ratio, and the largest difference of the results as a part of the largest result.
 """
 import argparse
 import statistics

@@ -8,6 +8,17 @@ import numpy
 from . import _core
 
 
+def numbers_of(given, name):
+    """An array of float64; raises UsageError for what is none."""
+    try:
+        array = numpy.asarray(given)
+        if array.dtype.kind not in "fiu" and array.size:
+            raise ValueError
+        return array.astype(float)
+    except (ValueError, TypeError, OverflowError):
+        raise _core.UsageError(f"{name} has to be an array of numbers.") from None
+
+
 class SparseMatrix(NamedTuple):
     """A sparse matrix as its entries, which unpack: rows, columns, values, shape. Equal places add up.
 
@@ -28,7 +39,7 @@ class SparseMatrix(NamedTuple):
     shape: tuple
 
     def __matmul__(self, x):
-        x = numpy.asarray(x)
+        x = numbers_of(x, "x")
         if x.ndim not in (1, 2) or x.shape[0] != self.shape[1]:
             raise _core.MismatchError(f"The matrix has {self.shape[1]} columns and cannot be multiplied with {x.shape}.")
         try:
@@ -226,9 +237,7 @@ def bindings(self):
 def _level_vertices(model, level):
     """Vertices of the finest level that a level has."""
     count = len(model.mesh.vertices)
-    if level is None or level == model.finest_level:
-        return numpy.arange(count)
-    return model.level_vertices(level)
+    return numpy.arange(count) if level is None else model.level_vertices(level)
 
 
 def prolongation(self, level=None):
@@ -301,7 +310,7 @@ def stacked(self):
 
 def from_stacked(rows):
     """The pose of an array as `stacked` gives it, (4 d, 3)."""
-    rows = numpy.asarray(rows, float)
+    rows = numbers_of(rows, "rows")
     if rows.ndim != 2 or rows.shape[1] != 3 or len(rows) % 4:
         raise _core.UsageError(f"rows has the shape {rows.shape}; a stacked pose has (4 d, 3).")
     rows = rows.reshape(-1, 4, 3)
@@ -404,7 +413,9 @@ def adjoint(self, vertices, pose=None, *, threads=0):
     positions, gradients = self._adjoint(vertices, threads)
     if pose is None or getattr(pose, "gradients", None) is not None:
         return PoseDerivative(positions, gradients)
-    at = pose.positions if isinstance(pose, _core.Pose) else pose
+    at = pose.positions if isinstance(pose, _core.Pose) else _core.Pose(pose).positions
+    if len(at) != len(positions):
+        raise _core.MismatchError(f"The pose has {len(at)} vertices, and the driver has {len(positions)}.")
     return PoseDerivative(positions + _operator_of(self).adjoint(at, gradients), None)
 
 

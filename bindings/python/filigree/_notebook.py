@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy
 
 from . import _core
+from ._matrices import numbers_of
 
 _MOST_DRAWN = 200_000  # vertices of a mesh that is drawn unasked: a second
 
@@ -172,14 +173,20 @@ def plot(mesh, *, scalars=None, color=None, title=None):
     except TypeError:
         mesh = _core.Mesh(mesh)
     if scalars is not None:
-        scalars = numpy.asarray(scalars, float)
+        scalars = numbers_of(scalars, "scalars")
         if scalars.shape != (len(mesh.vertices),):
-            raise _core.MismatchError(f"There are {len(scalars)} scalars for {len(mesh.vertices)} vertices.")
+            raise _core.MismatchError(f"There are {scalars.size} scalars for {len(mesh.vertices)} vertices.")
+        if not numpy.isfinite(scalars).all():
+            raise _core.UsageError("scalars has numbers that are not finite.")
         colors = _colors_of(scalars)
     elif color is None and mesh.colors is not None:
         colors = mesh.colors[:, :3].astype(float) ** 2.2
     else:
-        colors = numpy.broadcast_to(numpy.array((0.75, 0.62, 0.5) if color is None else color, float) ** 2.2, (len(mesh.vertices), 3))
+        one = numbers_of((0.75, 0.62, 0.5) if color is None else color, "color")
+        if one.shape != (3,) or not ((one >= 0) & (one <= 1)).all():
+            raise _core.UsageError("color has to be three numbers from 0 to 1.")
+        one **= 2.2
+        colors = numpy.broadcast_to(one, (len(mesh.vertices), 3))
     places = mesh.vertices.astype(float)
     if len(places):
         low, high = places.min(axis=0), places.max(axis=0)
@@ -215,10 +222,14 @@ def _card(name, numbers, mesh=None):
     if mesh is not None and 0 < len(mesh.vertices) <= _MOST_DRAWN:
         try:
             drawn = _core.render(mesh, width=320, height=240, passes=2)
-            picture = f'<td><img alt="" width="320" height="240" src="data:image/png;base64,{_text(numpy.frombuffer(_png(drawn), numpy.uint8))}"></td>'
+            data = base64.b64encode(_png(drawn)).decode()
+            picture = f'<td><img alt="" width="320" height="240" src="data:image/png;base64,{data}"></td>'
         except _core.Error:
             pass
-    rows = "".join(f"<tr><th style='text-align:left'>{html.escape(str(k))}</th><td>{html.escape(str(v))}</td></tr>" for k, v in numbers.items())
+    rows = "".join(
+        f"<tr><th style='text-align:left'>{html.escape(str(k))}</th><td>{html.escape(str(v))}</td></tr>"
+        for k, v in numbers.items()
+    )
     return f"<table><tr>{picture}<td><b>filigree.{name}</b><table>{rows}</table></td></tr></table>"
 
 

@@ -96,7 +96,7 @@ py::dict info(const py::object& given, unsigned threads) {
 
 py::dict compare(const py::object& a, const py::object& b, std::size_t samples, unsigned threads,
                  const py::object& progress) {
-    const MeshPtr first = mesh_of(a, "a"), second = mesh_of(b, "b");
+    const MeshPtr first = mesh_or_points_of(a, "a"), second = mesh_or_points_of(b, "b");
     const MeshDistance distance = LongCall{threads, progress}.owning(
         [=](const RunContext& context) { return mesh_distance(*first, *second, samples, context).value(); });
     py::dict said;
@@ -158,7 +158,7 @@ Say how far one mesh is from another.
 
 Parameters
 ----------
-a, b : Mesh, or an object with vertices and faces or triangles
+a, b : Mesh, an object with vertices and faces or triangles, (V, F), or array_like (n, 3)
     `b` is what is measured against: fractions are of its diagonal.
 samples : int
     Points on each surface, besides its vertices.
@@ -172,7 +172,7 @@ dict
     m.def(
         "vertex_distances",
         [](const py::object& a, const py::object& b, unsigned threads) {
-            const MeshPtr first = mesh_of(a, "a"), second = mesh_of(b, "b");
+            const MeshPtr first = mesh_or_points_of(a, "a"), second = mesh_or_points_of(b, "b");
             const RunContext& context = short_context(threads);
             return take(
                 without_interpreter([&] { return vertex_distance(*first, *second, context).value().per_vertex; }));
@@ -180,7 +180,7 @@ dict
         py::arg("a"), py::arg("b"), py::kw_only(), py::arg("threads") = 0, R"(vertex_distances(a, b, *, threads=0)
 --
 
-How far each vertex of `a` is from the same vertex of `b`, model units, float32 (n,).
+How far each vertex of `a` is from the same vertex of `b`, model units, float32 (n,). Both are meshes or points.
 
 Raises
 ------
@@ -190,7 +190,7 @@ MismatchError
     m.def(
         "distances_to_surface",
         [](const py::object& a, const py::object& b, unsigned threads, const py::object& progress) {
-            const MeshPtr first = mesh_of(a, "a"), second = mesh_of(b, "b");
+            const MeshPtr first = mesh_or_points_of(a, "a"), second = mesh_of(b, "b");
             return take(LongCall{threads, progress}.owning(
                 [=](const RunContext& context) { return distances_to_surface(*first, *second, context).value(); }));
         },
@@ -198,7 +198,8 @@ MismatchError
         R"(distances_to_surface(a, b, *, threads=0, progress=None)
 --
 
-How far each vertex of `a` is from the surface of `b`, model units, float32 (n,).
+How far each vertex of `a`, a mesh or points, is from the surface of `b`, model units, float32 (n,). `closest_points` says
+where.
 
 Raises
 ------

@@ -272,6 +272,14 @@ void warn_of_turns(const OutwardReport& outward) {
     if (const std::string sentence = outward_sentence(outward); !sentence.empty()) warn({sentence});
 }
 
+MeshPtr mesh_or_points_of(const py::handle& given, const char* name) {
+    if (is_mesh_like(given)) return mesh_of(given, name);
+    if (!py::isinstance<py::array>(given) && !py::isinstance<py::list>(given)) return mesh_of(given, name); // refuses
+    auto points = std::make_shared<Mesh>();
+    split_origin(double_points_of(given, name), *points);
+    return points;
+}
+
 std::vector<Vec3d> world_points_of(const py::handle& given) {
     std::vector<Vec3d> points;
     const auto add = [&](const Mesh& mesh) {

@@ -19,6 +19,9 @@ bool is_mesh_like(const py::handle& given);
 /// The mesh. name: of the argument.
 MeshPtr mesh_of(const py::handle& given, const char* name = "mesh");
 
+/// The same, or points of shape (n, 3), which become a mesh without faces.
+MeshPtr mesh_or_points_of(const py::handle& given, const char* name);
+
 /// Of a mesh, a model, or points: where they are in the world, and their box.
 std::vector<Vec3d> world_points_of(const py::handle& given);
 Box box_of(const py::handle& given);

@@ -26,7 +26,7 @@ MODEL = filigree.strip(filigree.make("wavy-sphere", resolution=8), base=20)
 RESTORER = filigree.Restorer(MODEL)
 MOVED = numpy.round(16 * filigree.twist(MODEL, "z", 50)(MODEL).positions) / 16
 GRADIENTS = numpy.round(16 * filigree.twist(MODEL, "z", 50)(MODEL).gradients) / 16
-SPARE = numpy.empty((len(RESTORER), 3), "f4")
+SPARE = numpy.zeros((len(RESTORER), 3), "f4")
 
 CLEAR = (filigree.Error, TypeError)
 
@@ -142,6 +142,34 @@ CALLS = {
     "write_picture": lambda x: filigree.write_picture(x, "/nowhere/at/all.png"),
     "write_animation": lambda x: filigree.write_animation(CUBE, x, "/nowhere/at/all.pc2"),
     "read_mesh": lambda x: filigree.read_mesh(x),
+    "closest_points": lambda x: filigree.closest_points(CUBE, x),
+    "closest_points of": lambda x: filigree.closest_points(x, VERTICES),
+    "pair": lambda x: filigree.areas((VERTICES, x)),
+    "pair of": lambda x: filigree.areas((x, FACES)),
+    "signed_distance": lambda x: filigree.signed_distance(CUBE, x),
+    "winding_numbers": lambda x: filigree.winding_numbers(CUBE, x),
+    "boundary": lambda x: filigree.boundary(x),
+    "split": lambda x: filigree.split(x),
+    "concatenate": lambda x: filigree.concatenate([CUBE, x]),
+    "adjacency": lambda x: filigree.adjacency(x),
+    "axis": lambda x: filigree.twist(CUBE, x, 10),
+    "radians": lambda x: filigree.bend(CUBE, "x", radians=x),
+    "Warp": lambda x: filigree.Warp(x),
+    "Warp of what returns": lambda x: filigree.Warp(lambda points: x)(VERTICES),
+    "Warp.gradient": lambda x: filigree.Warp(lambda points: points, lambda points: x).warp(VERTICES),
+    "adjoint": lambda x: RESTORER.adjoint(x),
+    "adjoint at": lambda x: RESTORER.adjoint(SPARE, x),
+    "from_stacked": lambda x: filigree.Pose.from_stacked(x),
+    "matrix": lambda x: RESTORER.matrix() @ x,
+    "prolongation": lambda x: MODEL.prolongation(x),
+    "energies": lambda x: BODY.energies(x),
+    "forces": lambda x: BODY.forces(x),
+    "hessian_product": lambda x: BODY.hessian_product(BODY.rest, x),
+    "stiffness_matrix": lambda x: BODY.stiffness_matrix(x),
+    "interpolation": lambda x: BODY.interpolation(x),
+    "plot": lambda x: filigree.plot(x),
+    "plot scalars": lambda x: filigree.plot(CUBE, scalars=x),
+    "plot color": lambda x: filigree.plot(CUBE, color=x),
 }
 BODY = filigree.Body(CUBE, "jelly", particles=30)
 SIMULATION = filigree.Simulation([BODY])

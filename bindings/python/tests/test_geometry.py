@@ -84,6 +84,15 @@ def test_signed_distances_and_winding_numbers():
     assert 0 < half[0] < 1 and abs(half[1]) < 0.01
 
 
+def test_points_are_compared():
+    moved = V + [0, 0, 0.5]
+    assert filigree.vertex_distances(moved, V) == pytest.approx(0.5)
+    assert filigree.compare(moved, V)["rms_units"] == pytest.approx(0.5)
+    assert filigree.distances_to_surface([[0.1, 0.1, -2]], (V, F)) == pytest.approx([2])
+    with pytest.raises(TypeError, match="a has to be a filigree.Mesh"):
+        filigree.compare(5, V)
+
+
 def test_far_from_the_origin():
     far = V + [1e6, 0, 0]
     assert filigree.closest_points((far, F), [[1e6 + 0.2, 0.2, -3]]).distances[0] == pytest.approx(3, rel=1e-6)

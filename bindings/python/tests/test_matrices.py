@@ -221,12 +221,13 @@ def test_interpolation(body):
 
 
 def test_refusals(body):
-    springs = filigree.Body(filigree.make("bar", resolution=4), filigree.Material("jelly", model="springs"), particles=100, size=0.4)
+    bar = filigree.make("bar", resolution=4)
+    springs = filigree.Body(bar, filigree.Material("jelly", model="springs"), particles=100, size=0.4)
     with pytest.raises(filigree.UnsuitableError, match="model fem"):
         springs.energies(springs.rest)
     with pytest.raises(filigree.MismatchError, match="particles"):
         body.forces(body.rest[1:])
-    meshfree = filigree.Body(filigree.make("bar", resolution=4), filigree.Material("jelly", model="meshfree"), particles=100, size=0.4)
+    meshfree = filigree.Body(bar, filigree.Material("jelly", model="meshfree"), particles=100, size=0.4)
     with pytest.raises(filigree.UnsuitableError, match="springs"):
         meshfree.interpolation([[0, 0, 0]])
     with pytest.raises(filigree.UsageError, match="no gradients"):
