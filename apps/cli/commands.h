@@ -23,6 +23,7 @@ Command sample_command();
 Command simulate_command();
 Command drop_command();
 Command sweep_command();
+Command convert_command();
 Command export_command();
 Command fit_command();
 Command flesh_command();
@@ -31,11 +32,12 @@ Command figures_command();
 std::vector<Command> drawing_commands();
 
 inline std::vector<Command> all_commands() {
-    std::vector<Command> commands = {make_command(),   info_command(),   remesh_command(),   strip_command(),
-                                     level_command(),  deform_command(), restore_command(),  compare_command(),
-                                     bench_command(),  demo_command(),   sample_command(),   simulate_command(),
-                                     drop_command(),   export_command(), fracture_command(), pack_command(),
-                                     unpack_command(), sweep_command(),  fit_command(),      flesh_command()};
+    std::vector<Command> commands = {make_command(),  info_command(),   remesh_command(),  strip_command(),
+                                     level_command(), deform_command(), restore_command(), compare_command(),
+                                     bench_command(), demo_command(),   sample_command(),  simulate_command(),
+                                     drop_command(),  export_command(), convert_command(), fracture_command(),
+                                     pack_command(),  unpack_command(), sweep_command(),   fit_command(),
+                                     flesh_command()};
     for (Command& command : drawing_commands()) commands.push_back(std::move(command));
     return commands;
 }

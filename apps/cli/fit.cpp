@@ -1,12 +1,10 @@
 #include "animation_output.h"
 #include "commands.h"
+#include "moving_input.h"
 #include "web_page.h"
 
 #include "filigree/fit.h"
 #include "filigree/io/animation/point_cache.h"
-#include "filigree/io/animation/pose_match.h"
-#include "filigree/io/gltf/gltf.h"
-#include "filigree/io/model/model_file.h"
 #include "filigree/io/system/extension.h"
 #include "filigree/pack.h"
 
@@ -66,83 +64,6 @@ void check(const FitArguments& options, const Session& session) {
         refuse(given + " belongs to --profile compact or stream, which round.");
     if (options.web) return;
     check_animation_options(options.outputs, session);
-}
-
-/// The animation that a command line means, and what it refers to. It is where it is made.
-struct Input {
-    std::optional<Model> model; ///< of a .fil
-    PoseSequence poses;
-    std::optional<Restorer> restorer;
-    Mesh rest;
-    MeshAnimation animation;
-    std::size_t joints = 0;  ///< of an animated glTF's skins
-    bool needs_rest = false; ///< no mesh at rest was given: a frame stands for it
-};
-
-/// The first mesh of a sequence, for its faces.
-Mesh first_mesh(const std::string& path, Session& session) {
-    const std::vector<fs::path> files = animation_files(path_of(path));
-    if (files.empty()) refuse(ErrorCode::not_found, path + ": has no meshes.");
-    std::vector<std::pair<std::uint64_t, fs::path>> numbered;
-    for (const fs::path& file : files) {
-        const std::string stem = file.stem().string();
-        const std::size_t digits = stem.find_last_not_of("0123456789") + 1;
-        if (digits < stem.size()) numbered.emplace_back(std::stoull(stem.substr(digits).substr(0, 18)), file);
-    }
-    return session.read_mesh((numbered.empty() ? files.front() : std::ranges::min(numbered).second).string());
-}
-
-/// A model's restored mesh as its own poses move it.
-void open_model_animation(const FitArguments& options, Session& session, Input& input) {
-    input.model = session.read_model(options.input, &input.poses);
-    if (input.poses.empty()) refuse(ErrorCode::unsuitable, options.input + ": has no poses, and so no motion to fit.");
-    input.restorer = require(Restorer::create(*input.model, {}, session.silent_context()));
-    input.rest = level_mesh(*input.model, input.model->finest_level());
-    input.animation = {&input.rest, input.poses.frames.size(),
-                       options.pose_file.frames_per_second.value_or(input.poses.frames_per_second),
-                       [&input](std::size_t frame, std::span<Vec3f> positions) {
-                           return input.restorer->positions(input.poses.frames[frame], positions);
-                       }};
-}
-
-void open_input(const FitArguments& options, Session& session, Input& input) {
-    const std::string extension = lower_extension(path_of(options.input));
-    const bool is_gltf_file = extension == ".glb" || extension == ".gltf";
-    std::error_code ignored;
-    const bool is_sequence = numbered_name(path_of(options.input)) || fs::is_directory(path_of(options.input), ignored);
-    if (!is_sequence && extension == ".fil" && options.mesh.empty())
-        return open_model_animation(options, session, input);
-    PoseFileOptions file = options.pose_file;
-    std::vector<std::string> warnings;
-    if (!options.mesh.empty()) {
-        input.rest = session.read_mesh(options.mesh);
-        if (is_gltf_file || is_sequence) { // vertices may have been split or sorted on the way
-            file.rest = input.rest.positions;
-            file.warnings = &warnings;
-        }
-    } else if (is_sequence) {
-        input.rest = first_mesh(options.input, session);
-        input.needs_rest = true;
-    } else if (is_gltf_file) {
-        const GltfScene scene = require(GltfScene::read(path_of(options.input), session.context()));
-        session.warn(scene.warnings());
-        input.rest = scene.mesh();
-        input.joints = scene.joint_count();
-    } else if (extension == ".abc") {
-        refuse(ErrorCode::unsupported, options.input + ": Alembic is not read; in Blender, import it and export .pc2 "
-                                                       "(add-on NewTek MDD or PC2) or an animated .glb.");
-    } else {
-        refuse(options.input + ": has positions alone; --mesh FILE gives the mesh that it moves.");
-    }
-    input.animation = require(open_animation(path_of(options.input), input.rest, file, session.context()));
-    session.warn(warnings);
-    if (options.mesh.empty() || file.warnings || input.animation.frames == 0) return;
-    std::vector<Vec3f> first(input.rest.vertex_count()); // caches of programs with another axis up lie on their faces
-    require(input.animation.positions(0, first));
-    if (const std::string turned =
-            turned_first_frame(input.rest.positions, first, input.rest.origin, path_of(options.input));
-        !turned.empty())
-        session.warn(turned);
 }
 
 /// Bits that round positions to a quarter of the error asked for, as far as there are so many.
@@ -297,8 +218,8 @@ void report_fit(const FitReport& fit, double seconds, Report& report) {
 
 void run(FitArguments options, Session& session) {
     check(options, session);
-    Input input;
-    open_input(options, session, input);
+    MovingInput input;
+    open_moving_input({options.input, options.mesh, options.pose_file}, session, input);
     if (options.rest > input.animation.frames)
         refuse(
             fmt::format("--rest {}: {} has the frames 1 to {}.", options.rest, options.input, input.animation.frames));

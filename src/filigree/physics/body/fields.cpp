@@ -5,8 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include <fmt/format.h>
+#include <cstdio>
 
 namespace filigree {
 
@@ -135,16 +134,23 @@ private:
     const RunContext& context_;
 };
 
+std::string rounded(double x) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.4g", x);
+    return text;
+}
+
 std::string wrong_field(const Body& body, FieldOf of) {
     const std::vector<float>& field = body.fields.of(of);
     if (field.empty()) return "";
     if (field.size() != body.cells.cells.size())
-        return fmt::format("The field of {} has {} values, and the body has {} cells.", name_of(of), field.size(),
-                           body.cells.cells.size());
+        return "The field of " + std::string(name_of(of)) + " has " + std::to_string(field.size()) +
+               " values, and the body has " + std::to_string(body.cells.cells.size()) + " cells.";
     for (std::size_t c = 0; c < field.size(); ++c)
         if (!(field[c] >= BodyFields::kLeast && field[c] <= BodyFields::kMost))
-            return fmt::format("The field of {} is {} in cell {}; it multiplies the material's value, from {} to {}.",
-                               name_of(of), field[c], c, BodyFields::kLeast, BodyFields::kMost);
+            return "The field of " + std::string(name_of(of)) + " is " + rounded(field[c]) + " in cell " +
+                   std::to_string(c) + "; it multiplies the material's value, from " + rounded(BodyFields::kLeast) +
+                   " to " + rounded(BodyFields::kMost) + ".";
     return "";
 }
 
@@ -216,10 +222,11 @@ Result<std::vector<float>> spread_inwards(const Body& body, const Mesh& mesh, st
                                           const RunContext& context) {
     if (std::optional<Error> wrong = mesh_error(mesh)) return *wrong;
     if (at_vertices.size() != mesh.vertex_count())
-        return field_error(fmt::format("There are {} values, and the mesh has {} vertices; give one value a vertex.",
-                                       at_vertices.size(), mesh.vertex_count()));
+        return field_error("There are " + std::to_string(at_vertices.size()) + " values, and the mesh has " +
+                           std::to_string(mesh.vertex_count()) + " vertices; give one value a vertex.");
     for (std::size_t v = 0; v < at_vertices.size(); ++v)
-        if (!std::isfinite(at_vertices[v])) return field_error(fmt::format("The value of vertex {} is not finite.", v));
+        if (!std::isfinite(at_vertices[v]))
+            return field_error("The value of vertex " + std::to_string(v) + " is not finite.");
     const Result<Triangulation> triangulation = triangulate(mesh, context);
     if (!triangulation) return triangulation.error();
     const SurfaceMeans means = surface_means(body, mesh, triangulation->triangles, at_vertices);
@@ -269,10 +276,10 @@ std::string fields_warning(const Body& body) {
     const auto [least, most] = std::ranges::minmax(stiffness);
     const float usual = BodyFields::kMostUsual;
     if (least >= 1 / usual && most <= usual) return "";
-    return fmt::format("The stiffness varies from {:.2g} to {:.2g} times the material's; beyond {:.2g} to {:.2g} the "
-                       "stiffest cells take many substeps and the softest ones are crushed. Pin hard parts, or change "
-                       "young_modulus.",
-                       least, most, 1 / usual, usual);
+    return "The stiffness varies from " + rounded(least) + " to " + rounded(most) + " times the material's; beyond " +
+           rounded(1 / usual) + " to " + rounded(usual) +
+           " the stiffest cells take many substeps and the softest ones are crushed. Pin hard parts, or change "
+           "young_modulus.";
 }
 
 Status add_vertex_fields(Body& body, const Mesh& mesh, std::span<const VertexField> fields, const RunContext& context) {
@@ -280,7 +287,7 @@ Status add_vertex_fields(Body& body, const Mesh& mesh, std::span<const VertexFie
     BodyFields spread;
     for (const VertexField& field : fields) {
         if (!spread.of(field.of).empty())
-            return field_error(fmt::format("There are two fields of {}; give one.", name_of(field.of)));
+            return field_error("There are two fields of " + std::string(name_of(field.of)) + "; give one.");
         Result<std::vector<float>> inside = spread_inwards(body, mesh, field.values, context);
         if (!inside) return inside.error();
         spread.of(field.of) = std::move(*inside);
