@@ -324,6 +324,8 @@ private:
             const std::string of = "Clip '" + names_[c] + "': ";
             if (!clip.is_loop && !options_.clip.loop && clip.skin_gap < kAlreadyLoops)
                 session_.warn(of + "it ends as it begins; with --loop its flesh does so too.");
+            if (clip.is_loop && clip.skin_gap > kAlreadyLoops)
+                session_.warn(of + "its joints end elsewhere than they begin; its flesh is a loop beside them.");
             if (clip.is_loop && clip.loop_rms > kRestlessLoop)
                 session_.warn(of + "the flesh does not settle into a cycle; raise --damping.");
             if (options_.flesh.frequency > clip.frames_per_second / 2)

@@ -133,6 +133,36 @@ TEST(Flesh, JointsThatChangeTheirSizeAreHeldOrLeftOut) {
     }
 }
 
+TEST(Flesh, LimbsThatACellGluesAreTold) {
+    const auto limbs = [](float gap) {
+        SkinnedMesh skin;
+        skin.mesh = make_box({0, 0, 0}, {0.6, 0.2, 0.2});
+        const Mesh other = make_box({0, 0.2 + double(gap), 0}, {0.6, 0.2, 0.2});
+        const auto first = Index(skin.mesh.vertex_count());
+        skin.mesh.positions.insert(skin.mesh.positions.end(), other.positions.begin(), other.positions.end());
+        for (std::size_t f = 0; f < other.face_count(); ++f) {
+            std::vector<Index> face(other.face(f).begin(), other.face(f).end());
+            for (Index& v : face) v += first;
+            skin.mesh.add_face(face);
+        }
+        skin.joints = {{.name = "one"}, {"a", 0}, {"b", 1}, {"c", 2}, {"two", 3}};
+        for (Index v = 0; v < skin.mesh.vertex_count(); ++v) {
+            skin.weights.joints.push_back(v < first ? 0 : 4);
+            skin.weights.weights.push_back(1);
+            skin.weights.first.push_back(v + 1);
+        }
+        skin.clips = {{"still", 1}};
+        skin.transforms = [](std::size_t, double, std::span<Eigen::Affine3d> out) {
+            std::ranges::fill(out, Eigen::Affine3d::Identity());
+        };
+        const std::vector<std::string> said = Flesh::create(skin, kSmall).value().report().warnings;
+        return std::ranges::any_of(
+            said, [](const std::string& sentence) { return sentence.starts_with("'one' and 'two' are closer"); });
+    };
+    EXPECT_TRUE(limbs(0.01f));
+    EXPECT_FALSE(limbs(0.3f));
+}
+
 TEST(Flesh, TheSameBytesForAnyThreads) {
     const auto frames = [](unsigned threads) {
         const RunContext context(threads);

@@ -11,9 +11,10 @@
 
 namespace filigree_test {
 
-/// The tube of made_skins.h with the clips "Bend" (the lower joint turns by 90 degrees about z in a second) and "Still"
-/// (one key). armature: JSON members of the node above the joints, such as a scale. parts: 2 gives its left and right
-/// half a mesh and a skin each. rod: hangs a tetrahedron without a skin on the lower joint.
+/// The tube of made_skins.h with the clips "Bend" (the lower joint turns by 90 degrees about z in a second), "Still"
+/// (one key) and "Wave" (there and back in a second). armature: JSON members of the node above the joints, such as a
+/// scale. parts: 2 gives its left and right half a mesh and a skin each. rod: hangs a tetrahedron without a skin on the
+/// lower joint.
 inline std::string skinned_tube(const std::string& armature = "", int parts = 1, bool rod = false) {
     using namespace filigree;
     const Mesh tube = make_cylinder({.resolution = 6, .size = 0.2, .length = 5});
@@ -60,6 +61,8 @@ inline std::string skinned_tube(const std::string& armature = "", int parts = 1,
     const auto times = std::to_string(file.add({0, 1}, "SCALAR", R"("min":[0],"max":[1])"));
     const auto turns = std::to_string(file.add({0, 0, 0, 1, 0, 0, 0.70710678f, 0.70710678f}, "VEC4"));
     const auto moment = std::to_string(file.add({0}, "SCALAR", R"("min":[0],"max":[0])"));
+    const auto there_and_back = std::to_string(file.add({0, 0.5f, 1}, "SCALAR", R"("min":[0],"max":[1])"));
+    const auto waves = std::to_string(file.add({0, 0, 0, 1, 0, 0, 0.38268343f, 0.92387953f, 0, 0, 0, 1}, "VEC4"));
     const auto turn = std::to_string(file.add({0, 0, 0, 1}, "VEC4"));
     const auto clip = [](const std::string& name, const std::string& input, const std::string& output) {
         return R"({"name":")" + name + R"(","samplers":[{"input":)" + input + R"(,"output":)" + output +
@@ -70,7 +73,8 @@ inline std::string skinned_tube(const std::string& armature = "", int parts = 1,
                      armature + R"(},{"name":"upper","translation":[-0.5,0,0],"children":[2]},)" +
                      R"({"name":"lower","translation":[0.5,0,0])" + (rod ? R"(,"children":[)" + rod_node + "]" : "") +
                      R"(},{"name":"tube","mesh":0,"skin":0})" + (nodes.empty() ? "" : "," + nodes) +
-                     R"(],"animations":[)" + clip("Bend", times, turns) + "," + clip("Still", moment, turn) + "]");
+                     R"(],"animations":[)" + clip("Bend", times, turns) + "," + clip("Still", moment, turn) + "," +
+                     clip("Wave", there_and_back, waves) + "]");
 }
 
 } // namespace filigree_test

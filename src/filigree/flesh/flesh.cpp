@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <string_view>
 
 namespace filigree {
@@ -26,7 +27,9 @@ constexpr double kLeafReach = 1.5;             ///< times the way from a last jo
 constexpr float kFolded = 0.3f, kWhole = 0.7f; ///< volume of a cell that the joints alone leave: from free to held
 constexpr float kThinDepth = 0.9f;             ///< spacings
 constexpr int kThinReach = 3;                  ///< cells
-constexpr std::size_t kMostMoments = 120;      ///< of a clip that are looked at for scales
+constexpr float kMainShare = 0.6f;             ///< weight of the joint that a particle belongs to
+constexpr std::size_t kFarInSkeleton = 4, kFewestGlued = 4; ///< joints, edges of the lattice
+constexpr std::size_t kMostMoments = 120;                   ///< of a clip that are looked at for scales
 
 Error usage(std::string sentence) { return {ErrorCode::usage, std::move(sentence)}; }
 
@@ -369,10 +372,54 @@ private:
         return Success{};
     }
 
+    /// Joints between two of them along the skeleton.
+    std::size_t steps_between(Index a, Index b) const {
+        const auto way_up = [&](Index joint) {
+            std::vector<Index> way;
+            for (Index at = joint; at != kNoIndex && way.size() <= skin().joints.size(); at = skin().joints[at].parent)
+                way.push_back(at);
+            return way;
+        };
+        const std::vector<Index> from_a = way_up(a), from_b = way_up(b);
+        for (std::size_t up = 0; up < from_a.size(); ++up) {
+            const auto met = std::ranges::find(from_b, from_a[up]);
+            if (met != from_b.end()) return up + std::size_t(met - from_b.begin());
+        }
+        return from_a.size() + from_b.size();
+    }
+
+    /// Limbs that one cell holds together, though the skeleton joins them far away: the pair that does so most often.
+    std::string glued_limbs() const {
+        std::map<std::pair<Index, Index>, std::size_t> counts;
+        const auto main_joint = [&](Index particle) {
+            const FleshWeights& of = flesh_.weights_[particle];
+            return of.weights[0] > kMainShare ? of.joints[0] : kNoIndex; // the largest is first
+        };
+        for (Index i = 0; i < neighbours_.size(); ++i)
+            for (const int side : {1, 3, 5}) {
+                const Index other = neighbours_[i][side];
+                if (other == kNoIndex) continue;
+                const Index a = main_joint(i), b = main_joint(other);
+                if (a != b && a != kNoIndex && b != kNoIndex) ++counts[std::minmax(a, b)];
+            }
+        std::pair<Index, Index> most;
+        std::size_t count = 0;
+        for (const auto& [pair, times] : counts)
+            if (times > count && steps_between(pair.first, pair.second) >= kFarInSkeleton) {
+                most = pair;
+                count = times;
+            }
+        if (count < kFewestGlued) return "";
+        return "'" + skin().joints[most.first].name + "' and '" + skin().joints[most.second].name +
+               "' are closer to each other than the particles and move as one piece there; take more particles, or "
+               "part them in the bind pose.";
+    }
+
     void collect_warnings() {
         FleshReport& report = flesh_.report_;
         std::vector<std::string>& warnings = report.warnings;
         if (!report.body.warning.empty()) warnings.push_back(report.body.warning);
+        if (std::string glued = glued_limbs(); !glued.empty()) warnings.push_back(std::move(glued));
         if (!report.left_out.empty())
             warnings.push_back("Joints that are mirrored or scaled beyond 1/2 and 2 carry their vertices as before, "
                                "without flesh: " +
