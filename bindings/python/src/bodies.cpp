@@ -77,8 +77,8 @@ PyBody make_one(const py::object& given, const py::object& material, std::option
     if (spacing && !(*spacing > 0)) refuse("spacing has to be above 0.");
     options.cells.spacing = spacing.value_or(0);
     options.separate = separate;
-    each_field(fields, [&](FieldOf of, std::vector<float> values) {
-        options.fields.push_back({of, std::move(values)});
+    each_field(fields, [&](FieldOf field, std::vector<float> values) {
+        options.fields.push_back({field, std::move(values)});
     });
     PyBody made{nullptr, mesh->origin};
     made.body = LongCall{threads, progress}([&](const RunContext& context) {

@@ -261,7 +261,6 @@ Result<double> scale_of(const Mesh& mesh, const BodyOptions& options) {
 /// Takes apart what cells join.
 Status keep_apart(const Mesh& mesh, const WeldedTriangles& welded, Body& body, BodyReport& report,
                   const RunContext& context) {
-    if (report.joined.corners == 0) return Success{};
     const Result<JoinedParts> left = separate_parts(mesh.positions, welded, body.scale, body.cells, context);
     if (!left) return left.error();
     report.joined = *left;

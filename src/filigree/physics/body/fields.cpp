@@ -2,10 +2,10 @@
 
 #include "filigree/core/parallel_for.h"
 #include "filigree/core/parallel_sum.h"
+#include "filigree/physics/body/occupied_cells.h"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 namespace filigree {
 
@@ -134,23 +134,19 @@ private:
     const RunContext& context_;
 };
 
-std::string rounded(double x) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.4g", x);
-    return text;
-}
-
 std::string wrong_field(const Body& body, FieldOf of) {
     const std::vector<float>& field = body.fields.of(of);
     if (field.empty()) return "";
+    const std::string name(name_of(of));
     if (field.size() != body.cells.cells.size())
-        return "The field of " + std::string(name_of(of)) + " has " + std::to_string(field.size()) +
-               " values, and the body has " + std::to_string(body.cells.cells.size()) + " cells.";
+        return "The field of " + name + " has " + std::to_string(field.size()) + " values, and the body has " +
+               std::to_string(body.cells.cells.size()) + " cells.";
     for (std::size_t c = 0; c < field.size(); ++c)
         if (!(field[c] >= BodyFields::kLeast && field[c] <= BodyFields::kMost))
-            return "The field of " + std::string(name_of(of)) + " is " + rounded(field[c]) + " in cell " +
-                   std::to_string(c) + "; it multiplies the material's value, from " + rounded(BodyFields::kLeast) +
-                   " to " + rounded(BodyFields::kMost) + ".";
+            return "The field of " + name + " is " + mesh_cells::number(double(field[c])) + " in cell " +
+                   std::to_string(c) + "; it multiplies the material's value, from " +
+                   mesh_cells::number(double(BodyFields::kLeast)) + " to " +
+                   mesh_cells::number(double(BodyFields::kMost)) + ".";
     return "";
 }
 
@@ -276,8 +272,9 @@ std::string fields_warning(const Body& body) {
     const auto [least, most] = std::ranges::minmax(stiffness);
     const float usual = BodyFields::kMostUsual;
     if (least >= 1 / usual && most <= usual) return "";
-    return "The stiffness varies from " + rounded(least) + " to " + rounded(most) + " times the material's; beyond " +
-           rounded(1 / usual) + " to " + rounded(usual) +
+    const auto said = [](float value) { return mesh_cells::number(double(value)); };
+    return "The stiffness varies from " + said(least) + " to " + said(most) + " times the material's; beyond " +
+           said(1 / usual) + " to " + said(usual) +
            " the stiffest cells take many substeps and the softest ones are crushed. Pin hard parts, or change "
            "young_modulus.";
 }
