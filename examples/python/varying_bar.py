@@ -23,7 +23,7 @@ pulled = numpy.flatnonzero(plain.rest[:, 0] > LENGTH / 2 - 1e-4)
 print("stiff half   longer by, m   theory, m   measured / theory   substeps a frame")
 errors = []
 for factor in (1, 3, 10):
-    body = plain.with_fields({"stiffness": numpy.where(plain.cells[:, 0] > 0, factor, 1)})
+    body = plain.with_fields({"stiffness": numpy.where(plain.cell_centres[:, 0] > 0, factor, 1)})
     simulation = filigree.Simulation(
         [body],
         gravity=(0, 0, 0),

@@ -76,8 +76,7 @@ TEST(CellDerivatives, GradientAndHessianAreTheEnergysDerivatives) {
     for (std::size_t i = 0; i < at.size(); ++i) EXPECT_LT((by_blocks[i] - product[i]).norm(), 1e-9 * largest);
 }
 
-TEST(CellDerivatives, ForcesAreTheSteppers) {
-    const Body body = derived_body();
+void expect_forces_of_the_stepper(const Body& body) {
     const CellDerivatives of = CellDerivatives::create(body).value();
     std::vector<Vec3d> at = shaken(body, 0.01);
     Vectors floats(at.size()), forces(at.size());
@@ -94,6 +93,14 @@ TEST(CellDerivatives, ForcesAreTheSteppers) {
     for (std::size_t i = 0; i < at.size(); ++i)
         EXPECT_LT((forces[i].cast<double>() + gradient[i]).norm(), 1e-5 * largest) << i;
     EXPECT_NEAR(energy_sum(of.energies(at, context)) / stepped->energy(floats, context), 1, 1e-9);
+}
+
+TEST(CellDerivatives, ForcesAreTheSteppers) {
+    Body body = derived_body();
+    expect_forces_of_the_stepper(body);
+    for (std::size_t cell = 0; cell < body.cells.cells.size(); ++cell)
+        body.fields.stiffness.push_back(cell % 3 == 0 ? 4.0f : 0.5f);
+    expect_forces_of_the_stepper(body);
 }
 
 TEST(CellDerivatives, OtherModelsAreRefused) {

@@ -260,7 +260,7 @@ Examples
             "volume", [](const py::object& self) { return view(self.cast<const PyBody&>().body->volume, self); },
             "Of each particle, m^3, float32 (p,), read-only.")
         .def_property_readonly(
-            "cells", [](const py::object& self) { return view(self.cast<const PyBody&>().body->cells.centroid, self); },
+            "cell_centres", [](const py::object& self) { return view(self.cast<const PyBody&>().body->cells.centroid, self); },
             "Of each cell, the middle of what it holds of the body at rest, m, float32 (c, 3), read-only.")
         .def_property_readonly("fields", &fields_of,
                                "What varies: by name one multiple a cell, float32 (c,), read-only. A copy of the dict.")
@@ -272,7 +272,7 @@ The same body with other fields.
 Parameters
 ----------
 fields : dict of str to array_like, (c,)
-    As of `Body`, but one multiple a cell (`cells` says where they are). Others stay; an empty array takes one away.
+    As of `Body`, but one multiple a cell (`cell_centres` says where they are). Others stay; an empty array takes one away.
 
 Returns
 -------
@@ -287,7 +287,7 @@ UsageError
 Examples
 --------
 >>> body = filigree.Body(filigree.make("bar", resolution=4), "jelly", spacing=0.25)
->>> body = body.with_fields({"density": 1 + 2 * (body.cells[:, 0] > 0)})
+>>> body = body.with_fields({"density": 1 + 2 * (body.cell_centres[:, 0] > 0)})
 >>> body.mass.sum()
 8000.0
 )")

@@ -33,10 +33,10 @@ def test_forces_of_ones_own(body):
 def test_fields_of_vertices_and_cells():
     stiff = 1 + 4 * (BAR.vertices[:, 0] > 0)
     varied = filigree.Body(BAR, "jelly", spacing=0.25, fields={"stiffness": stiff})
-    assert set(varied.fields) == {"stiffness"} and len(varied.cells) == len(varied.fields["stiffness"])
-    right = varied.cells[:, 0] > 0
+    assert set(varied.fields) == {"stiffness"} and len(varied.cell_centres) == len(varied.fields["stiffness"])
+    right = varied.cell_centres[:, 0] > 0
     found = varied.fields["stiffness"]
-    assert found[varied.cells[:, 0] > 1.2].min() > 4.8 and found[varied.cells[:, 0] < -1.2].max() < 1.1
+    assert found[varied.cell_centres[:, 0] > 1.2].min() > 4.8 and found[varied.cell_centres[:, 0] < -1.2].max() < 1.1
     assert found.min() >= 1 and found.max() <= 5
     heavy = varied.with_fields({"density": numpy.where(right, 3, 1)})
     assert heavy.mass.sum() == pytest.approx(2 * varied.report["mass"])

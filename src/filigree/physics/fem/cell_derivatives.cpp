@@ -44,8 +44,9 @@ struct CellLaw {
     double by_I_I = 0, by_I_bent_bent = 0, by_J_J = 0;
     std::array<Vec3d, 3> cofactor; ///< of X_1, X_2, X_4
 
-    CellLaw(const cell_kernel::CellMaterial& m, const CornerVectors& X, float filled) {
-        const double h = m.spacing, volume = double(filled) * h * h * h;
+    /// stiffness: times the material's.
+    CellLaw(const cell_kernel::CellMaterial& m, const CornerVectors& X, float filled, float stiffness) {
+        const double h = m.spacing, volume = double(stiffness) * double(filled) * h * h * h;
         size = 4 * h;
         shear = volume * double(m.shear);
         bulk = volume * double(m.bulk);
@@ -107,6 +108,12 @@ struct CellLaw {
     }
 };
 
+/// Of a cell whose corners have the sums X.
+CellLaw law_of(const Body& body, const cell_kernel::CellMaterial& material, std::size_t cell, const CornerVectors& X) {
+    const std::vector<float>& stiffness = body.fields.stiffness;
+    return {material, X, body.cells.fraction[cell], stiffness.empty() ? 1 : stiffness[cell]};
+}
+
 CornerVectors corners_of(const std::array<Index, 8>& corners, std::span<const Vec3d> values) {
     CornerVectors at;
     for (std::size_t c = 0; c < 8; ++c) at[c] = values[corners[c]];
@@ -157,8 +164,7 @@ std::vector<double> CellDerivatives::energies(std::span<const Vec3d> positions, 
     parallel_for(context, energies.size(), kDerivativeGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t cell = begin; cell < end; ++cell)
             energies[cell] =
-                CellLaw(material, sums_of(corners_of(cells.cell_corners[cell], positions)), cells.fraction[cell])
-                    .energy;
+                law_of(*body_, material, cell, sums_of(corners_of(cells.cell_corners[cell], positions))).energy;
     });
     return energies;
 }
@@ -168,7 +174,7 @@ std::vector<Vec3d> CellDerivatives::gradient(std::span<const Vec3d> positions, c
     const cell_kernel::CellMaterial material = cell_kernel::cell_material(body_->material, cells.spacing);
     return sum_at_corners(context, [&](std::size_t cell) {
         const CornerVectors X = sums_of(corners_of(cells.cell_corners[cell], positions));
-        return CellLaw(material, X, cells.fraction[cell]).gradient(X);
+        return law_of(*body_, material, cell, X).gradient(X);
     });
 }
 
@@ -179,7 +185,7 @@ std::vector<Vec3d> CellDerivatives::hessian_product(std::span<const Vec3d> posit
     return sum_at_corners(context, [&](std::size_t cell) {
         const CornerVectors X = sums_of(corners_of(cells.cell_corners[cell], positions));
         const CornerVectors dX = sums_of(corners_of(cells.cell_corners[cell], directions));
-        return CellLaw(material, X, cells.fraction[cell]).change(X, dX);
+        return law_of(*body_, material, cell, X).change(X, dX);
     });
 }
 
@@ -191,7 +197,7 @@ std::vector<CellDerivatives::CellBlock> CellDerivatives::hessian_blocks(std::spa
     parallel_for(context, blocks.size(), kDerivativeGrain / 16, [&](std::size_t begin, std::size_t end) {
         for (std::size_t cell = begin; cell < end; ++cell) {
             const CornerVectors X = sums_of(corners_of(cells.cell_corners[cell], positions));
-            const CellLaw law(material, X, cells.fraction[cell]);
+            const CellLaw law = law_of(*body_, material, cell, X);
             for (std::size_t column = 0; column < 24; ++column) {
                 CornerVectors direction;
                 direction.fill(Vec3d::Zero());
