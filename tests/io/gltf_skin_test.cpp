@@ -76,6 +76,7 @@ TEST_F(GltfSkin, TakesTheArmaturesSizeAndTurn) {
             EXPECT_LT((joint.linear() - Mat3d::Identity()).norm(), 1e-5) << armature;
         const GltfScene scene = GltfScene::read(text, "tube.gltf", RunContext()).value();
         EXPECT_NEAR(size, bounds(scene.mesh()).size().maxCoeff(), 1e-5 * size) << armature;
+        EXPECT_GT(analyse_topology(skin.mesh).volume, 0) << armature; // also where it is mirrored
     }
 }
 

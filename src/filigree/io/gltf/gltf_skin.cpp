@@ -199,7 +199,25 @@ private:
                 return refuse("its bind pose has vertices at no place that 32-bit float can hold.");
         split_origin(world, skin_.mesh);
         if (!skin_.mesh.normals.empty()) skin_.mesh.normals.values = gltf::turned_normals(scene_, pose, context_);
+        if (is_mirrored()) turn_inside_out();
         return Success{};
+    }
+
+    /// Whether the armature turns all of the mesh inside out.
+    bool is_mirrored() const {
+        return std::ranges::all_of(scene_.blocks, [&](const gltf::Block& block) {
+            return block.skinned && placed_[*scene_.nodes[block.node].skin]->linear.determinant() < 0;
+        });
+    }
+
+    void turn_inside_out() {
+        Mesh& mesh = skin_.mesh;
+        for (std::size_t f = 0; f < mesh.face_count(); ++f)
+            for (std::vector<Index>* corners : {&mesh.corners, &mesh.uvs.corners, &mesh.normals.corners})
+                if (!corners->empty())
+                    std::reverse(corners->begin() + std::ptrdiff_t(mesh.face_offsets[f]),
+                                 corners->begin() + std::ptrdiff_t(mesh.face_offsets[f + 1]));
+        for (Vec3f& normal : mesh.normals.values) normal = -normal;
     }
 
     /// What a joint is in the file, and the map from the bind pose's world to the space that its matrix expects.
