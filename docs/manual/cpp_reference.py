@@ -9,7 +9,7 @@ from pathlib import Path
 
 # In the order in which they build on each other.
 HEADERS = ["types", "result", "context", "mesh", "strip", "pose", "restore", "fit", "pack", "file", "sample", "remesh",
-           "reference", "physics/material", "physics/body", "physics/world", "physics/simulation", "fracture", "scene", "render"]
+           "reference", "physics/material", "physics/body", "physics/world", "physics/simulation", "fracture", "skin", "flesh", "scene", "render"]
 DOXYFILE = """
 INPUT = {inputs}
 GENERATE_HTML = NO

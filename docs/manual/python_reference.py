@@ -13,6 +13,7 @@ AREAS = {
     "Quads and pieces": ["remesh", "Remeshed", "fracture", "FracturedMesh"],
     "The report's method": ["strip_reference", "ReferenceModel"],
     "Bodies": ["Body", "Material", "materials", "Simulation", "Attachment", "Actor", "Obstacle", "Pin", "Force", "Hand", "HeatSource", "RigidMotion", "Momentum", "SceneRun"],
+    "Flesh": ["read_skin", "Skin", "Flesh", "target_velocities"],
     "Writing for other programs": ["export", "write_animation"],
     "Pictures": ["render", "read_picture", "write_picture", "plot", "View"],
     "Errors": ["Error", "UsageError", "NotFoundError", "BadFileError", "UnsupportedError", "UnwritableError", "UnsuitableError", "MismatchError", "OutOfMemoryError", "Cancelled", "FiligreeWarning"],
