@@ -1,6 +1,7 @@
 // A simulation as Python has it.
 #pragma once
 
+#include "calls.h"
 #include "world.h"
 
 #include <mutex>
