@@ -138,6 +138,21 @@ static flg_status try_model(const unsigned char* file, size_t size) {
         fail("a pose that fits is refused");
     if (flg_restore(model, pose, positions, info.normals > 0 ? normals : NULL, scratch) != FLG_OK)
         fail("an opened model is not restored");
+    {
+        uint32_t* drivers = (uint32_t*)malloc(12 * (size_t)info.vertices);
+        float *weights = (float*)malloc(12 * (size_t)info.vertices),
+              *matrices = (float*)malloc(64 * (size_t)info.driver_vertices);
+        const uint32_t first = (uint32_t)any((uint64_t)info.vertices + 1);
+        if (!drivers || !weights || !matrices) fail("no memory");
+        if (flg_skin_matrices(model, pose, matrices) != FLG_OK ||
+            flg_skin(model, first, info.vertices - first, drivers, weights, positions) != FLG_OK)
+            fail("an opened model has no skin");
+        for (size_t k = 0; k < 3 * (size_t)(info.vertices - first); ++k)
+            if (drivers[k] >= info.driver_vertices) fail("a skin has a driver vertex that is not there");
+        free(drivers);
+        free(weights);
+        free(matrices);
+    }
     if (flg_triangles(model))
         for (size_t k = 0; k < 3 * (size_t)info.triangles; ++k)
             if (flg_triangles(model)[k] >= info.vertices) fail("a triangle has a vertex that is not there");

@@ -1,4 +1,4 @@
-import { BufferGeometry, Material, SkinnedMesh } from "three";
+import { BufferGeometry, Material, Mesh, SkinnedMesh } from "three";
 import { Model } from "filigree";
 
 /** A geometry that follows a model's driver, restored in WebAssembly. */
@@ -24,3 +24,16 @@ export class RestoredMesh extends SkinnedMesh {
 
 /** Makes a material turn the normals of any skin as they have to be under stretch: by the cofactor of the matrix. */
 export function correctSkinNormals<M extends Material>(material: M): M;
+
+/** The driver as a mesh of three.js that moves: with a skin, with morph targets. */
+export class MeshDriver {
+    /**
+     * mesh: has the driver's vertices at rest, at the same places but in any order, also split ones. Throws Error where
+     * a driver vertex is missing. Cost: driver vertices times vertices of the mesh.
+     */
+    constructor(model: Model, mesh: Mesh);
+    /** Where `follow` leaves the driver, in the mesh's own space: 3 numbers a driver vertex. */
+    readonly positions: Float32Array;
+    /** Reads where the mesh is now. Skinned meshes need their matrices up to date (scene.updateMatrixWorld). */
+    follow(): this;
+}

@@ -1,12 +1,13 @@
 // What follows a model's driver in three.js: a mesh restored in the vertex shader, and a geometry restored on the
 // processor, in WebAssembly.
-import { Box3, BufferAttribute, BufferGeometry, DynamicDrawUsage } from "three";
+import { Box3, BufferAttribute, BufferGeometry, DynamicDrawUsage, Vector3 } from "three";
 import { copyPoints, drawnUvs, drawnVertices } from "./drawn.js";
 import { DrivenMesh, DriverSkeleton } from "./three_skin.js";
 
 export { correctSkinNormals } from "./three_skin.js";
 
 const MOST_SMALL_INDICES = 65536;
+const SAME_PLACE = 1e-3; // of the diagonal: files may hold rounded positions
 
 /** Restored in the vertex shader: each frame uploads 64 bytes a driver vertex. */
 export class RestoredMesh extends DrivenMesh {
@@ -93,6 +94,44 @@ export class RestoredGeometry extends BufferGeometry {
             this.attributes.normal.needsUpdate = true;
         }
         this.boundingBox = this.boundingSphere = null;
+        return this;
+    }
+}
+
+/** The driver as a mesh of three.js that moves: with a skin, with morph targets. */
+export class MeshDriver {
+    #mesh;
+    #vertices; // of the mesh, one for each driver vertex
+    #place = new Vector3();
+
+    /**
+     * mesh: has the driver's vertices at rest, at the same places but in any order, also split ones, as importers leave
+     * them.
+     */
+    constructor(model, mesh) {
+        const rest = model.driverRest.slice(), { position } = mesh.geometry.attributes, count = rest.length / 3;
+        const limit = SAME_PLACE * new Box3().setFromArray(rest).getSize(new Vector3()).length();
+        this.#mesh = mesh;
+        this.#vertices = new Uint32Array(count);
+        /** Where `follow` leaves the driver, in the mesh's own space. */
+        this.positions = rest;
+        for (let v = 0; v < count; ++v) {
+            let nearest = Infinity;
+            for (let k = 0; k < position.count; ++k) {
+                const x = position.getX(k) - rest[3 * v], y = position.getY(k) - rest[3 * v + 1];
+                const z = position.getZ(k) - rest[3 * v + 2], distance = x * x + y * y + z * z;
+                if (!(distance < nearest)) continue;
+                nearest = distance;
+                this.#vertices[v] = k;
+            }
+            if (!(nearest <= limit * limit))
+                throw new Error(`The mesh has no vertex where driver vertex ${v} rests. Is it this model's driver, in its units?`);
+        }
+    }
+
+    /** Reads where the mesh is now: then read `positions`. Skinned meshes need their matrices up to date. */
+    follow() {
+        this.#vertices.forEach((k, v) => this.#mesh.getVertexPosition(k, this.#place).toArray(this.positions, 3 * v));
         return this;
     }
 }
