@@ -122,16 +122,25 @@ TEST(Math, EdgesAreThoseOfTheStandardLibrary) {
             EXPECT_NEAR(found / right, 1, 1e-14) << name << " of " << x;
         }
     };
-#define EXPECT_SAME(call) same(math::call(x), std::call(x), #call, x);
+#define EXPECT_SAME(call) same(math::call(x), std::call(x), #call, x)
     for (const double x : edges) {
-        EXPECT_SAME(atan)
-        EXPECT_SAME(asin)
-        EXPECT_SAME(acos) EXPECT_SAME(exp) EXPECT_SAME(exp2) EXPECT_SAME(expm1) EXPECT_SAME(log) EXPECT_SAME(log2)
-            EXPECT_SAME(log10) EXPECT_SAME(log1p) EXPECT_SAME(cbrt) if (!(std::abs(x) > 1e6)) {
+        EXPECT_SAME(atan);
+        EXPECT_SAME(asin);
+        EXPECT_SAME(acos);
+        EXPECT_SAME(exp);
+        EXPECT_SAME(exp2);
+        EXPECT_SAME(expm1);
+        EXPECT_SAME(log);
+        EXPECT_SAME(log2);
+        EXPECT_SAME(log10);
+        EXPECT_SAME(log1p);
+        EXPECT_SAME(cbrt);
+        if (!(std::abs(x) > 1e6)) {
             if (std::abs(x) != std::numbers::pi) {
-                EXPECT_SAME(sin) EXPECT_SAME(tan)
+                EXPECT_SAME(sin);
+                EXPECT_SAME(tan);
             }
-            EXPECT_SAME(cos)
+            EXPECT_SAME(cos);
         }
         for (const double y : edges) {
             same(math::pow(x, y), std::pow(x, y), "pow", x);
