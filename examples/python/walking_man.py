@@ -12,19 +12,23 @@ import sys
 
 import numpy as np
 
+# %% His joints
 # Name, parent, where it is, and what hangs on it: ends and radii of capsules, metres, y up, facing z.
 JOINTS = [
     ("Hips", None, (0, 0.95, 0), [((-0.08, 0.92, 0), (0.08, 0.92, 0), 0.145)]),
     ("Spine", "Hips", (0, 1.05, 0), [((0, 1.05, 0.07), (0, 1.12, 0.07), 0.2)]),
-    ("Chest", "Spine", (0, 1.25, 0), [((-0.1, 1.38, 0), (0.1, 1.38, 0), 0.145), ((0, 1.25, 0.02), (0, 1.36, 0.02), 0.16)]),
+    ("Chest", "Spine", (0, 1.25, 0),
+     [((-0.1, 1.38, 0), (0.1, 1.38, 0), 0.145), ((0, 1.25, 0.02), (0, 1.36, 0.02), 0.16)]),
     ("Neck", "Chest", (0, 1.5, 0), [((0, 1.5, 0), (0, 1.58, 0.01), 0.065)]),
-    ("Head", "Neck", (0, 1.6, 0.01), [((0, 1.66, 0.02), (0, 1.74, 0.02), 0.1), ((0, 1.64, 0.12), (0, 1.65, 0.125), 0.022)]),
+    ("Head", "Neck", (0, 1.6, 0.01),
+     [((0, 1.66, 0.02), (0, 1.74, 0.02), 0.1), ((0, 1.64, 0.12), (0, 1.65, 0.125), 0.022)]),
 ]
 for side, s in (("Left", 1), ("Right", -1)):
     JOINTS += [
         (side + "UpLeg", "Hips", (0.12 * s, 0.9, 0), [((0.135 * s, 0.85, 0), (0.15 * s, 0.55, 0), 0.09)]),
         (side + "Leg", side + "UpLeg", (0.155 * s, 0.5, 0), [((0.155 * s, 0.48, 0), (0.16 * s, 0.12, -0.015), 0.062)]),
-        (side + "Foot", side + "Leg", (0.16 * s, 0.09, -0.02), [((0.16 * s, 0.06, -0.03), (0.175 * s, 0.05, 0.14), 0.05)]),
+        (side + "Foot", side + "Leg", (0.16 * s, 0.09, -0.02),
+         [((0.16 * s, 0.06, -0.03), (0.175 * s, 0.05, 0.14), 0.05)]),
         (side + "Arm", "Chest", (0.2 * s, 1.42, 0), [((0.2 * s, 1.42, 0), (0.45 * s, 1.4, 0), 0.06)]),
         (side + "ForeArm", side + "Arm", (0.47 * s, 1.4, 0), [((0.48 * s, 1.4, 0), (0.68 * s, 1.4, 0), 0.05)]),
         (side + "Hand", side + "ForeArm", (0.71 * s, 1.4, 0), [((0.72 * s, 1.4, 0), (0.83 * s, 1.4, 0), 0.045)]),
@@ -32,6 +36,7 @@ for side, s in (("Left", 1), ("Right", -1)):
 NAMES = [joint[0] for joint in JOINTS]
 
 
+# %% His surface
 def capsule_distance(points, a, b, radius):
     a, b = np.array(a, float), np.array(b, float)
     along = b - a
@@ -86,6 +91,7 @@ def surface_net(step):
     return places, np.concatenate(faces)
 
 
+# %% His motion
 def rotation(axis, degrees):
     half = np.radians(degrees) / 2
     return np.array([*(np.sin(half) * np.array(axis, float)), np.cos(half)])
@@ -128,12 +134,14 @@ def jump(phase):
         pose[side + "UpLeg"] = rotation(X, -60 * crouch)
         pose[side + "Leg"] = rotation(X, 105 * max(crouch, 0))
         pose[side + "Foot"] = rotation(X, -45 * crouch)
-        pose[side + "Arm"] = times(rotation(X, 50 * crouch - 120 * (height > 0) * min(height, 0.3) / 0.3), HANG[side + "Arm"])
+        lift = 50 * crouch - 120 * min(max(height, 0), 0.3) / 0.3
+        pose[side + "Arm"] = times(rotation(X, lift), HANG[side + "Arm"])
     pose["Spine"] = rotation(X, 25 * max(crouch, 0))
     leg = 0.9 * (1 - np.cos(np.radians(52 * max(crouch, 0))))
     return pose, np.array([0, height - 0.45 * leg, 0])
 
 
+# %% The file
 def main():
     paths = [argument for argument in sys.argv[1:] if not argument.startswith("--")]
     path, step = paths[0] if paths else "man.glb", 0.009 if "--fine" in sys.argv else 0.022
@@ -145,14 +153,16 @@ def main():
     of_best = np.take_along_axis(weight, best, 1)
     of_best[of_best < 0.02] = 0
     of_best /= of_best.sum(1, keepdims=True)
+    best[of_best == 0] = 0
 
     chunks, views, accessors = [], [], []
 
-    def add(array, kind, component, bounds=False):
+    def add(array, kind, component, bounds=False, target=None):
         data = np.ascontiguousarray(array).tobytes()
         offset = sum(map(len, chunks))
         chunks.append(data + b"\0" * (-len(data) % 4))
-        views.append({"buffer": 0, "byteOffset": offset, "byteLength": len(data)})
+        view = {"buffer": 0, "byteOffset": offset, "byteLength": len(data)}
+        views.append(view | ({"target": target} if target else {}))
         accessor = {"bufferView": len(views) - 1, "componentType": component, "count": len(array), "type": kind}
         if bounds:
             flat = np.asarray(array).reshape(len(array), -1)
@@ -181,7 +191,8 @@ def main():
 
         def channel(joint, path, values, kind):
             samplers.append({"input": clock, "output": add(np.array(values, np.float32), kind, 5126)})
-            channels.append({"sampler": len(samplers) - 1, "target": {"node": first + NAMES.index(joint), "path": path}})
+            target = {"node": first + NAMES.index(joint), "path": path}
+            channels.append({"sampler": len(samplers) - 1, "target": target})
 
         for joint in NAMES:
             values = [pose.get(joint, rotation(X, 0)) for pose, _ in poses]
@@ -190,18 +201,21 @@ def main():
         animations.append({"name": name, "samplers": samplers, "channels": channels})
 
     attributes = {
-        "POSITION": add(places.astype(np.float32), "VEC3", 5126, True),
-        "JOINTS_0": add(best.astype(np.uint8), "VEC4", 5121),
-        "WEIGHTS_0": add(of_best.astype(np.float32), "VEC4", 5126),
+        "POSITION": add(places.astype(np.float32), "VEC3", 5126, True, 34962),
+        "JOINTS_0": add(best.astype(np.uint8), "VEC4", 5121, target=34962),
+        "WEIGHTS_0": add(of_best.astype(np.float32), "VEC4", 5126, target=34962),
     }
+    indices = add(triangles.astype(np.uint32).reshape(-1), "SCALAR", 5125, target=34963)
+    look = {"baseColorFactor": [0.72, 0.47, 0.36, 1], "metallicFactor": 0, "roughnessFactor": 0.6}
+    joints = list(range(first, first + len(JOINTS)))
     document = {
         "asset": {"version": "2.0", "generator": "walking_man.py"},
         "scene": 0,
         "scenes": [{"nodes": [0, first]}],
         "nodes": nodes,
-        "meshes": [{"name": "Man", "primitives": [{"attributes": attributes, "indices": add(triangles.astype(np.uint32).reshape(-1), "SCALAR", 5125), "material": 0}]}],
-        "materials": [{"name": "Skin", "pbrMetallicRoughness": {"baseColorFactor": [0.72, 0.47, 0.36, 1], "metallicFactor": 0, "roughnessFactor": 0.6}}],
-        "skins": [{"joints": list(range(first, first + len(JOINTS))), "skeleton": first, "inverseBindMatrices": add(binds, "MAT4", 5126)}],
+        "meshes": [{"name": "Man", "primitives": [{"attributes": attributes, "indices": indices, "material": 0}]}],
+        "materials": [{"name": "Skin", "pbrMetallicRoughness": look}],
+        "skins": [{"joints": joints, "skeleton": first, "inverseBindMatrices": add(binds, "MAT4", 5126)}],
         "animations": animations,
         "bufferViews": views,
         "accessors": accessors,
@@ -212,7 +226,8 @@ def main():
     text += b" " * (-len(text) % 4)
     with open(path, "wb") as file:
         file.write(struct.pack("<III", 0x46546C67, 2, 12 + 8 + len(text) + 8 + len(binary)))
-        file.write(struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary)
+        file.write(struct.pack("<II", len(text), 0x4E4F534A) + text)
+        file.write(struct.pack("<II", len(binary), 0x004E4942) + binary)
     print(f"{path}: {len(places):,} vertices, {len(JOINTS)} joints, clips Walk and Jump")
 
 
