@@ -176,7 +176,7 @@ public:
     }
 
 private:
-    Status begin(const Vectors positions, bool at_skin) {
+    Status begin(const Vectors positions, bool at_skin) { // a copy: what the targets keep is written over
         const Vectors start = targets_->at(0), velocities = targets_->velocities(0);
         if (Status set = simulation_->set_positions(0, positions); !set) return set;
         if (at_skin)
