@@ -9,7 +9,8 @@
 //     write_mesh(restorer.mesh(warp_pose(*bend, model)).value(), "bent.ply");
 //
 // Bodies that move, break and melt have headers of their own: physics/material.h, body.h, world.h and simulation.h;
-// fracture.h; scene.h for scene files; render.h for pictures. reference.h has the method of the student's report.
+// fracture.h; skin.h and flesh.h for characters; scene.h for scene files; render.h for pictures. reference.h has the
+// method of the student's report.
 #pragma once
 
 #include "filigree/context.h"
