@@ -132,6 +132,8 @@ CALLS = {
     "RigidMotion": lambda x: filigree.RigidMotion(x, move=x),
     "Hand": lambda x: filigree.Hand(0, x, x),
     "set_forces": lambda x: SIMULATION.set_forces(0, x),
+    "set_follow": lambda x: filigree.Simulation([BODY], automatic_rigid=False).set_follow(0, x, BODY.rest, BODY.rest),
+    "target_velocities": lambda x: filigree.target_velocities(x, x, x, 60),
     "set_positions": lambda x: filigree.Simulation([BODY]).set_positions(0, x),
     "attach": lambda x: filigree.Simulation([BODY]).attach(0, x).pose(),
     "chain": lambda x: filigree.chain(x),
