@@ -169,6 +169,13 @@ TEST(SeparateParts, WhatIsWholeStaysAsItIs) {
     }
 }
 
+TEST(SeparateParts, SaysWhereItSeesNoGaps) {
+    BodyReport report;
+    BodyOptions options{.cells = {.count = 200}, .separate = true};
+    ASSERT_TRUE(make_body(make_wavy_plane({.resolution = 8}), {}, options, kTwoThreads, &report));
+    EXPECT_NE(report.warning.find("The mesh is open"), std::string::npos) << report.warning;
+}
+
 TEST(SeparateParts, RefusesWhatItCannotDo) {
     Material springs;
     springs.model = MaterialModel::springs;

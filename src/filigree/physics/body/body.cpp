@@ -258,15 +258,19 @@ Result<double> scale_of(const Mesh& mesh, const BodyOptions& options) {
     return *options.size / longest;
 }
 
-/// Takes apart what cells join.
-Status keep_apart(const Mesh& mesh, const WeldedTriangles& welded, Body& body, BodyReport& report,
-                  const RunContext& context) {
-    const Result<JoinedParts> left = separate_parts(mesh.positions, welded, body.scale, body.cells, context);
+/// Takes apart what cells join. Returns what the user should know of it, as a sentence, or "".
+Result<std::string> keep_apart(const Mesh& mesh, const WeldedTriangles& welded, Body& body, BodyReport& report,
+                               const RunContext& context) {
+    const Result<std::optional<JoinedParts>> left =
+        separate_parts(mesh.positions, welded, body.scale, body.cells, context);
     if (!left) return left.error();
-    report.joined = *left;
+    if (!*left)
+        return std::string("The mesh is open, or its box has more than 2^24 cells, so no gaps are seen in it and "
+                           "separate keeps nothing apart; close the mesh first.");
+    report.joined = **left;
     const std::vector<Cells::LatticeIndex>& corners = body.cells.corners;
     for (std::size_t c = 1; c < corners.size(); ++c) report.separated_corners += corners[c] == corners[c - 1];
-    return Success{};
+    return std::string();
 }
 
 bool joins_by_cells(MaterialModel model) { return model != MaterialModel::rigid && model != MaterialModel::mpm; }
@@ -296,10 +300,13 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
         if (!joined) return joined.error();
         found.joined = *joined;
     }
+    std::string not_told;
     if (options.separate) {
         if (material.model != MaterialModel::fem)
             return Error{ErrorCode::usage, "Only bodies of the model fem keep near parts apart (separate)."};
-        if (Status apart = keep_apart(mesh, *welded, body, found, context); !apart) return apart.error();
+        Result<std::string> apart = keep_apart(mesh, *welded, body, found, context);
+        if (!apart) return apart.error();
+        not_told = std::move(*apart);
     }
     if (!uses_centroids(material.model)) share_with_neighbours(body.cells);
     found.split_cells = make_particles(body, context);
@@ -316,6 +323,7 @@ Result<Body> make_body(const Mesh& mesh, const Material& material, const BodyOpt
     for (const float mass : body.mass) found.mass += mass;
     found.outward = welded->outward;
     found.warning = warning_of(body, found);
+    if (!not_told.empty()) found.warning += (found.warning.empty() ? "" : " ") + not_told;
     return body;
 }
 

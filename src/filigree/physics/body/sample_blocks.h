@@ -16,6 +16,7 @@ namespace filigree {
 inline constexpr unsigned kSamplesAlong = 4;        ///< of a cell
 inline constexpr int kCellsNear = 1, kCellsFar = 4; ///< cells to either side of a corner that are looked at
 inline constexpr int kLeastPart = 64;               ///< samples: smaller parts are flecks
+inline constexpr int kLeastNear = 16;               ///< of those in the 2^3 cells around a corner
 
 /// A cube of samples, one bit each: rows along x, by z and y.
 template <class Word>
@@ -127,6 +128,21 @@ public:
         int steps = 0;
         for (FarBlock wider = reached; !wider.meets(other) && steps < FarBlock::kSide; ++steps) wider = wider.dilated();
         return steps - 1;
+    }
+
+    /// Whether the cells around a corner hold two parts that do not hang together in these, neither of them a fleck: a
+    /// gap, or a crease that is deeper than a cell.
+    bool parts_near(const Cells::LatticeIndex& corner) const {
+        const auto inside = block<std::uint8_t>(corner, kCellsNear);
+        if (inside.is_full()) return false;
+        int parts = 0;
+        for (NearBlock left = inside; !left.is_empty() && parts < 2;) {
+            NearBlock part = left.first();
+            part.flood(inside);
+            left = left.without(part);
+            parts += part.count() >= kLeastNear && part.is_thick();
+        }
+        return parts == 2;
     }
 
 private:

@@ -151,29 +151,29 @@ private:
         return found;
     }
 
-    /// Corners in whose cells two parts lie, from those on between which there is a gap.
+    /// Corners in whose cells two parts lie: those at gaps and deep creases, and from there on.
     void find_gaps() {
         const GapFinder finder(samples_);
         parallel_for(context_, gaps_.size(), 256, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t c = begin; c < end && !context_.is_cancelled(); ++c)
+            for (std::size_t c = begin; c < end && !context_.is_cancelled(); ++c) {
                 gaps_[c] = std::uint8_t(finder.gap(cells_.corners[c]));
+                is_at_gap_[c] = gaps_[c] > 0 || finder.parts_near(cells_.corners[c]);
+            }
         });
         for (Index c = 0; c < gaps_.size(); ++c)
-            if (gaps_[c] > 0) add_corner(c);
+            if (is_at_gap_[c]) at_gaps_.push_back(c);
         for (std::size_t next = 0; next < at_gaps_.size(); ++next) { // grows
             const LatticeIndex at = cells_.corners[at_gaps_[next]];
             for (int n = 0; n < 27; ++n) {
                 const Index corner = corner_at(at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1);
                 if (corner == kNoIndex || is_at_gap_[corner]) continue;
                 const Around found = around(corner);
-                if (std::ranges::any_of(found.sets, [](Index set) { return set != 0; })) add_corner(corner);
+                if (std::ranges::none_of(found.sets, [](Index set) { return set != 0; })) continue;
+                is_at_gap_[corner] = 1;
+                at_gaps_.push_back(corner);
             }
         }
         std::ranges::sort(at_gaps_);
-    }
-    void add_corner(Index corner) {
-        is_at_gap_[corner] = 1;
-        at_gaps_.push_back(corner);
     }
 
     /// What hangs together at all gaps, to know flecks by: these stay in their cells.
@@ -422,14 +422,16 @@ private:
 
 } // namespace
 
-Result<JoinedParts> separate_parts(std::span<const Vec3f> positions, const WeldedTriangles& welded, double scale,
-                                   Cells& cells, const RunContext& context) {
+Result<std::optional<JoinedParts>> separate_parts(std::span<const Vec3f> positions, const WeldedTriangles& welded,
+                                                  double scale, Cells& cells, const RunContext& context) {
     RunContext quiet = context;
     quiet.progress = nullptr;
     const Result<std::optional<Occupancy>> samples = gap_samples(positions, welded, scale, cells, quiet);
     if (!samples) return samples.error();
-    if (!*samples) return JoinedParts{};
-    return PartSeparator(**samples, cells, quiet).run();
+    if (!*samples) return std::optional<JoinedParts>();
+    const Result<JoinedParts> left = PartSeparator(**samples, cells, quiet).run();
+    if (!left) return left.error();
+    return std::optional<JoinedParts>(*left);
 }
 
 } // namespace filigree
