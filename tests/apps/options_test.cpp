@@ -123,7 +123,7 @@ TEST_F(OptionTables, ManualPagesNameEveryOption) {
             EXPECT_NE(of_command.find("\\fB" + escaped + "\\fR"), std::string::npos) << name;
         }
     }
-    EXPECT_EQ(commands, 21u);
+    EXPECT_EQ(commands, 23u);
     fails(2, {"--man", "swim"}, {"swim"});
 }
 
