@@ -20,8 +20,8 @@ protected:
         const double scale = *body.body.size / box.size().maxCoeff();
         double lowest = 1e9;
         for (const Vec3f& p : mesh.positions)
-            lowest = std::min(lowest,
-                              (*body.centre + body.rotation * (scale * (p.cast<double>() - box.centre())))[axis]);
+            lowest =
+                std::min(lowest, (*body.centre + body.rotation * (scale * (p.cast<double>() - box.centre())))[axis]);
         return lowest;
     }
 };

@@ -51,7 +51,8 @@ TEST(CellDerivatives, GradientAndHessianAreTheEnergysDerivatives) {
         behind[i] -= step * direction[i];
     }
     const RunContext context(2);
-    const double slope = (energy_sum(of.energies(ahead, context)) - energy_sum(of.energies(behind, context))) / (2 * step);
+    const double slope =
+        (energy_sum(of.energies(ahead, context)) - energy_sum(of.energies(behind, context))) / (2 * step);
     EXPECT_NEAR(dot_of(of.gradient(at, context), direction) / slope, 1, 1e-6);
 
     const std::vector<Vec3d> product = of.hessian_product(at, direction, context), up = of.gradient(ahead, context),

@@ -260,7 +260,8 @@ Examples
             "volume", [](const py::object& self) { return view(self.cast<const PyBody&>().body->volume, self); },
             "Of each particle, m^3, float32 (p,), read-only.")
         .def_property_readonly(
-            "cell_centres", [](const py::object& self) { return view(self.cast<const PyBody&>().body->cells.centroid, self); },
+            "cell_centres",
+            [](const py::object& self) { return view(self.cast<const PyBody&>().body->cells.centroid, self); },
             "Of each cell, the middle of what it holds of the body at rest, m, float32 (c, 3), read-only.")
         .def_property_readonly("fields", &fields_of,
                                "What varies: by name one multiple a cell, float32 (c,), read-only. A copy of the dict.")

@@ -74,8 +74,8 @@ public:
     virtual std::span<const PlasticCell> plastic_cells() const;
     virtual void take_over(std::span<const PlasticCell> of_whole, std::span<const Index> cells);
 
-    /// How strongly crushed matter resists to be crushed further, of 1; materials without such a law do nothing. What an
-    /// animation crushes would take ten times as many substeps, and comes back by itself.
+    /// How strongly crushed matter resists to be crushed further, of 1; materials without such a law do nothing. What
+    /// an animation crushes would take ten times as many substeps, and comes back by itself.
     virtual void set_crush_share(float share);
 
     /// Stored state as bytes, and back; empty for elastic materials. restore_state is false for bytes of another body.
