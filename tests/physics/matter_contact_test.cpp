@@ -245,6 +245,7 @@ std::size_t points_within(const Matter& matter, const Vectors& positions) {
 
 /// It lands on its feet, and its creases close.
 TEST(MatterContact, AKoalaThatSitsDownStaysOutOfItself) {
+    constexpr std::size_t kAsked = 300; // points that would lie within the koala without contact
     const std::vector<filigree_test::CorpusRow> rows = filigree_test::read_corpus();
     const auto koala = std::ranges::find_if(rows, [](const auto& row) { return row.path.stem() == "koala_100k"; });
     if (koala == rows.end()) GTEST_SKIP() << "no koala in the corpus";
@@ -267,12 +268,13 @@ TEST(MatterContact, AKoalaThatSitsDownStaysOutOfItself) {
         for (int frame = 0; frame < 90; ++frame) {
             EXPECT_TRUE(dropped.advance(kAllThreads).ok());
             if (frame % 3 == 0) within += points_within(matter, dropped.positions(0));
+            if (!meets_itself && within > kAsked) break; // enough is known
         }
         return within;
     };
     const std::size_t within = drop(true), unmet = drop(false);
     EXPECT_LT(within, 10u); // in 30 frames; 274 where no folds are looked for
-    EXPECT_GT(unmet, 300u) << "the scene asks nothing of contact";
+    EXPECT_GT(unmet, kAsked) << "the scene asks nothing of contact";
     RecordProperty("points", std::to_string(within) + " of " + std::to_string(unmet));
 }
 
