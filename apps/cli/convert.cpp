@@ -28,7 +28,7 @@ bool is_one_of(const std::string& path, std::initializer_list<std::string_view> 
     return std::ranges::find(extensions, lower_extension(path_of(path))) != extensions.end();
 }
 
-/// One mesh leaves: its name has the ending of a mesh, and no number.
+/// Whether the output is one mesh: its name has the ending of a mesh format, and no number.
 bool is_mesh_output(const std::string& path) {
     std::error_code ignored;
     return !path.ends_with('/') && !fs::is_directory(path_of(path), ignored) && !numbered_name(path_of(path)) &&
