@@ -87,7 +87,7 @@ def signed_distance(mesh, points, *, method="auto", threads=0):
     points : array_like, (n, 3)
         World coordinates.
     method : str
-        How inside is told: as of `InsideTest`.
+        How inside is told: see `InsideTest`.
 
     Returns
     -------

@@ -200,7 +200,7 @@ def plot_mesh(self, **how):
 
 
 def plot_pose(self, model=None, **how):
-    """Show a pose: the mesh that `model` restores from it, or without a model the driver's vertices. Others as of `plot`."""
+    """Show a pose: the mesh that `model` restores from it, or without a model the driver's vertices. Other parameters: see `plot`."""
     return plot(_core.restore(model, self) if model is not None else self.positions, **how)
 
 

@@ -245,7 +245,7 @@ UsageError
              R"(move_obstacle(self, obstacle, *, move=(0, 0, 0), axis=(0, 1, 0), degrees=0.0, matrix=None)
 --
 
-In the next frame an obstacle goes there evenly, pushing what is in its way, and stands there. Parameters and errors as of
+In the next frame an obstacle goes there evenly, pushing what is in its way, and stands there. Parameters and errors: see
 `set_obstacle`.
 )")
         .def("obstacle_pose", &obstacle_pose, py::arg("obstacle"), R"(obstacle_pose(self, obstacle)

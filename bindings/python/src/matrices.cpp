@@ -211,14 +211,14 @@ Examples
 --
 
 Elastic forces on the particles of a body of 'fem', N: minus the derivative of `energies(positions).sum()`, float64 (p, 3).
-Parameters and errors as of `energies`.
+Parameters and errors: see `energies`.
 )")
         .def("hessian_product", &hessian_product, py::arg("positions"), py::arg("directions"), py::kw_only(),
              py::arg("threads") = 0, R"(hessian_product(self, positions, directions, *, threads=0)
 --
 
 The second derivative of the elastic energy times directions, (p, 3): minus how `forces` change along them. float64 (p, 3).
-Other parameters and errors as of `energies`. A solver wants it in place of the matrix, which is `stiffness_matrix`.
+Other parameters and errors: see `energies`. A solver wants it in place of the matrix, which is `stiffness_matrix`.
 )");
 }
 

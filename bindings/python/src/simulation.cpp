@@ -410,7 +410,7 @@ UsageError
             py::arg("body"), py::arg("velocities"), R"(set_velocities(self, body, velocities)
 --
 
-Give a body's particles other velocities: array_like (p, 3), m/s. Errors as of `set_positions`.
+Give a body's particles other velocities: array_like (p, 3), m/s. Errors: see `set_positions`.
 )")
         .def(
             "set_forces",

@@ -472,12 +472,12 @@ Warp
     add("squeeze", &make_squeeze, R"(squeeze(box, axis, factor)
 --
 
-Scale by `factor`, above 0, along the axis and across it so that the volume stays. `box` and `axis` as of `stretch`.
+Scale by `factor`, above 0, along the axis and across it so that the volume stays. `box` and `axis`: see `stretch`.
 )");
     add_turning("bend", &make_bend, R"(bend(box, axis, degrees=None, *, radians=None)
 --
 
-Bend the axis into an arc of `degrees` (or `radians`) over the box's length. `box` and `axis` as of `stretch`.
+Bend the axis into an arc of `degrees` (or `radians`) over the box's length. `box` and `axis`: see `stretch`.
 
 Examples
 --------
@@ -488,13 +488,13 @@ Examples
     add_turning("twist", &make_twist, R"(twist(box, axis, degrees=None, *, radians=None)
 --
 
-Turn cross-sections about the axis, the far end by `degrees` (or `radians`) against the near end. `box` and `axis` as of
+Turn cross-sections about the axis, the far end by `degrees` (or `radians`) against the near end. `box` and `axis`: see
 `stretch`.
 )");
     add("taper", &make_taper, R"(taper(box, axis, factor)
 --
 
-Scale cross-sections, from 1 at the near end to `factor`, above 0, at the far end. `box` and `axis` as of `stretch`.
+Scale cross-sections, from 1 at the near end to `factor`, above 0, at the far end. `box` and `axis`: see `stretch`.
 )");
     m.def(
         "smooth_random",
@@ -508,7 +508,7 @@ Scale cross-sections, from 1 at the near end to `factor`, above 0, at the far en
         py::arg("box"), py::arg("amplitude"), py::arg("seed") = 1, R"(smooth_random(box, amplitude, seed=1)
 --
 
-Smooth random displacement of up to `amplitude` times the box's diagonal. `box` as of `stretch`.
+Smooth random displacement of up to `amplitude` times the box's diagonal. `box`: see `stretch`.
 )");
     m.def(
         "rbf",

@@ -151,7 +151,7 @@ to 1; `temperature` (K; a number, or a pair of times and values) and `heat_trans
         R"(ball(centre, radius, *, motion=..., friction=0.5, restitution=0.5, stiffness=1.0, temperature=293.0, heat_transfer=0.0)
 --
 
-A ball; m. The others as of `plane`.
+A ball; m. Other parameters: see `plane`.
 )");
     add(
         "box",
@@ -164,7 +164,7 @@ A ball; m. The others as of `plane`.
         R"(box(centre, size, *, motion=..., friction=0.5, restitution=0.5, stiffness=1.0, temperature=293.0, heat_transfer=0.0)
 --
 
-A box along the axes before its motion; m. The others as of `plane`.
+A box along the axes before its motion; m. Other parameters: see `plane`.
 )");
     obstacle.def_static(
         "mesh",

@@ -311,11 +311,11 @@ public:
     /// pieces hold together; then each follows its own piece. A point whose piece does not exist or has no matter
     /// follows the piece that it lies in, and so do all points of the function above.
     std::size_t attach(std::size_t body, std::span<const Vec3f> points, std::span<const Index> pieces,
-                       const RunContext& context);
+                       const RunContext& context = RunContext());
     /// Where attached points are now (world, m), and the deformation gradients there. points: as many as were attached;
     /// gradients: as many, or empty when not wanted.
     void attached(std::size_t attachment, std::span<Vec3f> points, std::span<Mat3f> gradients,
-                  const RunContext& context) const;
+                  const RunContext& context = RunContext()) const;
 
     /// How far the matter around attached points has changed: 0 as at the start, 1 molten or kneaded through. It never
     /// falls, and is 0 for bodies that are not of mpm. renewal: as many numbers as points were attached.
