@@ -198,6 +198,7 @@ public:
     void cut(const DistanceField& other, float radius);
 
 private:
+    friend struct WorldParts; // writes it to bytes
     Box box_;
     Vec3f corner_;
     float spacing_ = 0;

@@ -250,6 +250,9 @@ public:
     Status set_targets(std::size_t body, const Vectors& positions, const Vectors& velocities,
                        const Vectors& accelerations = {});
 
+    /// Replaces the gravity of the world, m/s^2, from now on; what sleeps wakes where it changes. save() does not keep
+    /// it. Errors: usage (a number that is not finite).
+    Status set_gravity(const Vec3d& gravity);
     /// Replace the air and the heat sources of the world, which bodies of mpm feel. Errors: usage (what check_air and
     /// check_heat_sources refuse); the old values then stay.
     Status set_air(const Keyed<double>& temperature, double heat_transfer);

@@ -67,6 +67,7 @@ public:
     std::span<const Triangle> triangles() const { return triangles_; }
 
 private:
+    friend struct WorldParts; // writes it to bytes
     ObstacleSurface() = default;
     void prepare();
     void find_sharp_edges();

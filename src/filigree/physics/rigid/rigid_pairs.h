@@ -19,6 +19,8 @@ public:
     RigidPairs(const World& world, std::size_t actors, bool between_bodies)
         : gravity_(float(world.gravity.norm())), laws_(world, actors), between_bodies_(between_bodies) {}
 
+    void set_gravity(const Vec3d& gravity) { gravity_ = float(gravity.norm()); }
+
     /// Which bodies may touch within the next `longest` seconds. What sleeps wakes where something awake pushes it;
     /// returns whether anything did.
     bool search(std::span<BodyState> bodies, double longest, const RunContext& context);
@@ -123,7 +125,7 @@ private:
     Vec3f world_place(const Pair& pair, const Point& point) const;
     Vec3f world_normal(const Pair& pair, const Point& point) const;
 
-    const float gravity_; ///< m/s^2
+    float gravity_; ///< m/s^2
     const PairLaws laws_;
     const bool between_bodies_;
     std::map<const Body*, std::shared_ptr<const RigidShape>> known_shapes_;

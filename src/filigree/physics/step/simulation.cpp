@@ -348,6 +348,15 @@ Status Simulation::set_targets(std::size_t body, const Vectors& positions, const
     return Success{};
 }
 
+Status Simulation::set_gravity(const Vec3d& gravity) {
+    if (!gravity.allFinite()) return usage("The gravity must be three finite numbers.");
+    if (gravity == state_->world.gravity) return Success{};
+    state_->world.gravity = gravity;
+    state_->rigid_pairs.set_gravity(gravity);
+    for (BodyState& body : state_->bodies)
+        if (body.rigid) filigree::wake(body);
+    return Success{};
+}
 Status Simulation::set_air(const Keyed<double>& temperature, double heat_transfer) {
     if (Status checked = check_air(temperature, heat_transfer); !checked) return checked;
     state_->world.air_temperature = temperature;
