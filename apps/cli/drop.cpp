@@ -1,6 +1,9 @@
 // A mesh falls: the scene for it is written here, and simulated as any other.
+#include "drop.h"
+
 #include "commands.h"
 #include "drawing.h"
+#include "live_page.h"
 #include "pictures.h"
 #include "simulate.h"
 
@@ -21,7 +24,7 @@ namespace fs = std::filesystem;
 
 struct DropArguments {
     SimulateArguments run;
-    std::string mesh, material = "rubber", scene;
+    std::string mesh, material = "rubber", scene, page;
     double size = 1, tilt = 0, duration = 3;
     std::optional<double> height = {}, young_modulus = {};
     std::optional<std::size_t> pieces = {};
@@ -133,9 +136,9 @@ private:
 };
 
 void check(const DropArguments& options) {
-    if (options.run.outputs.empty() && options.scene.empty())
+    if (options.run.outputs.empty() && options.scene.empty() && options.page.empty())
         refuse("Say where the motion goes: -o OUT.glb, -o FILM.mp4, -o OUT.fil or -o OUT.pc2; or where the scene goes: "
-               "--scene SCENE.toml.");
+               "--scene SCENE.toml; or a page in which it moves: --page FOLDER.");
     if (!material_called(options.material)) {
         std::vector<std::string_view> names;
         for (const NamedMaterial& named : named_materials()) names.push_back(named.name);
@@ -146,6 +149,8 @@ void check(const DropArguments& options) {
         refuse(ErrorCode::unsuitable,
                fmt::format("--pieces: {} does not break; glass, plaster and brittle-stone do.", options.material));
     check_folder_of(options.scene);
+    if (!options.page.empty() && !options.run.outputs.empty())
+        refuse("--page and -o are two jobs, as the page simulates by itself; run the command once for each.");
 }
 
 void run(const DropArguments& options, Session& session) {
@@ -162,11 +167,18 @@ void run(const DropArguments& options, Session& session) {
     }
     if (!options.run.outputs.empty()) return run_scene(std::move(scene), options.run, session);
     Report report;
-    report.add("scene", options.scene, "scene", options.scene);
+    if (!options.scene.empty()) report.add("scene", options.scene, "scene", options.scene);
+    if (!options.page.empty()) export_live_page(scene, options.page, options.mesh, session, report);
     session.print(report);
 }
 
 } // namespace
+
+SceneFile default_drop_scene(const std::string& path, const Mesh& mesh) {
+    DropArguments options;
+    options.mesh = path;
+    return require(parse_scene(DropScene(options, mesh, path_of(path).generic_string()).text(), "scene of " + path));
+}
 
 Command drop_command() {
     const auto options = std::make_shared<DropArguments>();
@@ -210,11 +222,15 @@ Command drop_command() {
                     Option("--duration", options->duration, "Length, s").above_zero().with_default(),
                     Option("--scene", options->scene,
                            "Write the scene as a file too, to change it and run it with 'filigree simulate'")
+                        .is_written(),
+                    Option("--page", options->page,
+                           "Write a folder with a page in which it falls, and can be pulled (docs/live.md)")
                         .is_written()} +
                 animation_options(options->run.animation),
             .examples = "  filigree drop scan.ply -o bounce.glb --material soft-rubber --size 1\n"
                         "  filigree drop vase.obj -o vase.mp4 --material glass --size 0.3 --height 1 --tilt 25\n"
-                        "  filigree drop scan.ply --scene scan.toml --obstacle slope",
+                        "  filigree drop scan.ply --scene scan.toml --obstacle slope\n"
+                        "  filigree drop scan.ply --page page/ --material jelly",
             .run = [options](Session& session) { run(*options, session); }};
 }
 

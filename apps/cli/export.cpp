@@ -1,6 +1,8 @@
 #include "animation_output.h"
 #include "coding_report.h"
 #include "commands.h"
+#include "drop.h"
+#include "live_page.h"
 #include "pictures.h"
 #include "restore_options.h"
 #include "web_page.h"
@@ -26,7 +28,7 @@ namespace fs = std::filesystem;
 struct ExportArguments {
     std::string input, output, poses;
     PoseFileOptions pose_file;
-    bool at_rest = false, web = false, stream = false;
+    bool at_rest = false, web = false, stream = false, live = false;
     unsigned bits = 14;
     RestoreOptions restore;
     AnimationOutput animation;
@@ -176,11 +178,36 @@ void export_page(const Model& model, const PoseSequence& own, ExportArguments op
     report.add("page", index, "page", index);
 }
 
+/// A page in which the bodies of a scene move; of a model or a mesh that falls as in `filigree drop`.
+void export_live(const ExportArguments& options, Session& session) {
+    if (!options.web) refuse("--live belongs to --web.");
+    const std::string given =
+        session.first_given({"--poses", "--frame-rate", "--animation", "--rest", "--stream", "--bits", "--as",
+                             "--key-rate", "--interpolation", "--influences", "--full-precision", "--compress",
+                             "--all-levels", "--no-normals", "--morph-normals", "--level", "--pose-up"});
+    if (!given.empty()) refuse(given + " belongs to pages that play a motion; in a page with --live bodies move.");
+    const double start = now_seconds();
+    Report report;
+    report.set("output", options.output);
+    if (lower_extension(path_of(options.input)) == ".toml") {
+        export_live_page(require(read_scene(options.input)), options.output, options.input, session, report);
+    } else {
+        const Session::Content content = session.read_any(session.open(options.input), options.input);
+        const auto* model = std::get_if<Model>(&content.value);
+        const Mesh& mesh = model ? model->mesh : std::get<Mesh>(content.value);
+        export_live_page(default_drop_scene(options.input, mesh), options.output, options.input, session, report);
+    }
+    const double seconds = now_seconds() - start;
+    report.add("seconds", fmt::format("{:.3g}", seconds), "export_seconds", seconds);
+    session.print(report);
+}
+
 void run(const ExportArguments& options, Session& session) {
     if (options.at_rest && !options.poses.empty()) refuse("--rest leaves the poses out that --poses names.");
     if (options.web && options.animation.compress)
         refuse("--compress is for other programs' viewers; --stream makes the page's model small.");
     if (options.stream && !options.web) refuse("--stream belongs to --web; 'filigree pack' writes a stream alone.");
+    if (options.live) return export_live(options, session);
     if (!options.web) {
         check_animation_path(options.output);
         check_not_input(options.output, {options.input, options.poses});
@@ -215,7 +242,8 @@ Command export_command() {
         .text = "Write a model for other programs, moving or at rest",
         .options =
             OptionList{
-                Option("file", options->input, "Model, or a mesh that moves (animated glTF, or with --poses)")
+                Option("file", options->input,
+                       "Model, or a mesh that moves (animated glTF, or with --poses); with --live a scene")
                     .is_read()
                     .required(),
                 output_option(options->output,
@@ -233,6 +261,9 @@ Command export_command() {
                 Option(
                     "--stream", options->stream,
                     "With --web: pack the model, coarse to fine; the page shows and moves it from its first bytes on"),
+                Option("--live", options->live,
+                       "With --web: write a page in which the bodies of a scene (.toml) move and can be pulled; a "
+                       "model or a mesh falls as in 'filigree drop' (docs/live.md)"),
                 Option("--bits", options->bits, "With --stream: bits of a position, along the longest side of the box")
                     .between(10, 16)
                     .with_default()} +
@@ -243,7 +274,8 @@ Command export_command() {
                     "  filigree export scan.fil -o levels.glb\n"
                     "  filigree export bounce.fil -o page/ --web\n"
                     "  filigree export ice.glb -o page/ --web\n"
-                    "  filigree export bounce.fil -o page/ --web --stream",
+                    "  filigree export bounce.fil -o page/ --web --stream\n"
+                    "  filigree export scene.toml -o page/ --web --live",
         .run = [options](Session& session) { run(*options, session); }};
 }
 

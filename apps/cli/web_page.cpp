@@ -53,7 +53,14 @@ std::string base64(std::string_view bytes) {
     return text;
 }
 
-std::string model_name(WebModel model) { return model == WebModel::glb ? "model.glb" : "model.fil"; }
+std::string model_name(WebModel model) {
+    return model == WebModel::glb ? "model.glb" : model == WebModel::stream ? "model.fil" : "model.live";
+}
+/// Of the page's parts: what goes into the folder as index.html and filigree.js.
+std::string part_name(WebModel model, const std::string& name) {
+    if (model != WebModel::live) return name;
+    return name == "index.html" ? "live.html" : name == "filigree.js" ? "live.js" : name;
+}
 
 } // namespace
 
@@ -68,14 +75,19 @@ WebPage::WebPage(OutputFolder& folder, std::string title, WebModel model)
                "--stream: this program was built without the page's decoder, which clang 16 for "
                "WebAssembly makes; run scripts/setup and build again.");
 #endif
+    std::error_code failed;
+    if (model == WebModel::live && !fs::exists(parts_ / "live.js", failed))
+        refuse(ErrorCode::unsupported, "--live: this program was built without the page's physics, which clang 16 for "
+                                       "WebAssembly makes; run scripts/setup and build again.");
 }
 
 void WebPage::write(Session& session) {
-    const std::string index = require(read_file(parts_ / "index.html"));
+    const std::string index = require(read_file(parts_ / part_name(kind_, "index.html")));
     const std::string titled = replaced(index, "{{title}}", html_text(title_));
     require(write_file(path_of(index_), replaced(titled, "{{model}}", kind_ == WebModel::glb ? "glb" : "stream")));
     for (const std::string& file : {script_, style_, license_})
-        require(write_file(path_of(file), require(read_file(parts_ / path_of(file).filename()))));
+        require(write_file(path_of(file),
+                           require(read_file(parts_ / part_name(kind_, path_of(file).filename().string())))));
     write_model_script(session);
 }
 

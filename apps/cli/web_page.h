@@ -9,10 +9,10 @@
 
 namespace filigree::cli {
 
-/// What the page shows: a GLB, or a coded model that comes level by level.
-enum class WebModel { glb, stream };
+/// What the page shows: a GLB, a coded model that comes level by level, or bodies that move by themselves.
+enum class WebModel { glb, stream, live };
 
-/// index.html, filigree.js, filigree.css, three-license.txt, model.glb (or model.fil), and model.glb.js, which holds
+/// index.html, filigree.js, filigree.css, three-license.txt, model.glb (or model.fil, model.live), and model.glb.js, which holds
 /// the same bytes as text: a page that was opened from disk may not read other files, but may run scripts.
 class WebPage {
 public:

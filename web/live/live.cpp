@@ -124,8 +124,8 @@ unsigned EXPORTED(particle_count)() {
     return unsigned(count);
 }
 
-/// Takes hold of the first body that a ray hits, where nothing stands before it. direction: of length 1. Returns how far
-/// away it is, m; below 0: there is none.
+/// Takes hold of the first body that a ray hits, where nothing stands before it. direction: of length 1. Returns how
+/// far away it is, m; below 0: there is none.
 double EXPORTED(grab)(double x, double y, double z, double dx, double dy, double dz) {
     const Vec3d origin(x, y, z), direction(dx, dy, dz);
     const std::optional<WorldHit> hit = page->simulation.cast_ray(origin, direction);

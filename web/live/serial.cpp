@@ -11,8 +11,8 @@ void run_on_pool(std::size_t pieces, unsigned, std::atomic<unsigned>&, const Loo
 
 } // namespace filigree
 
-// Only a result's value that nobody checked, and memory that has run out, are thrown. Here both stop the program, and the
-// worker says that it was stopped. So nothing of it has to be unwound.
+// Only a result's value that nobody checked, and memory that has run out, are thrown. Here both stop the program, and
+// the worker says that it was stopped. So nothing of it has to be unwound.
 extern "C" {
 void* __cxa_allocate_exception(std::size_t) throw() { __builtin_trap(); }
 [[noreturn]] void __cxa_throw(void*, std::type_info*, void (*)(void*)) { __builtin_trap(); }

@@ -478,8 +478,9 @@ Result<std::string> write_live_world(const LiveWorld& live) {
 }
 
 Result<LiveWorld> read_live_world(std::string_view bytes) {
-    const Error damaged{ErrorCode::bad_file, "The bodies of the page are damaged or of another version; export the page "
-                                             "again."};
+    const Error damaged{ErrorCode::bad_file,
+                        "The bodies of the page are damaged or of another version; export the page "
+                        "again."};
     if (ByteReader(bytes).value<std::uint64_t>() != kLiveMagic) return damaged;
     const std::string_view contents = bytes.substr(0, bytes.size() - sizeof(std::uint64_t));
     const auto sum = ByteReader(bytes.substr(contents.size())).value<std::uint64_t>();

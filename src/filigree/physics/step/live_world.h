@@ -1,6 +1,6 @@
-// A simulation at its start as bytes: bodies with their particles and distance fields, how they break, obstacles, and the
-// points that go along. Whoever reads them needs no mesh, no lattice and no search: a web page, where the library is
-// compiled without them (web/live).
+// A simulation at its start as bytes: bodies with their particles and distance fields, how they break, obstacles, and
+// the points that go along. Whoever reads them needs no mesh, no lattice and no search: a web page, where the library
+// is compiled without them (web/live).
 #pragma once
 
 #include "filigree/physics/simulation.h"
@@ -25,8 +25,8 @@ struct LiveWorld {
     std::vector<AttachedPoints> attached;
 };
 
-/// Where a body breaks, the function of its Partition is left out: whoever reads the bytes gets one that gives a point to
-/// the piece whose surface is nearest. Errors: unsuitable (a body of mpm). Cost O(bytes).
+/// Where a body breaks, the function of its Partition is left out: whoever reads the bytes gets one that gives a point
+/// to the piece whose surface is nearest. Errors: unsuitable (a body of mpm). Cost O(bytes).
 Result<std::string> write_live_world(const LiveWorld& live);
 /// Shared bodies are shared again. Errors: bad_file (damaged, or of another version).
 Result<LiveWorld> read_live_world(std::string_view bytes);
