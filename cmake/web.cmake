@@ -65,7 +65,38 @@ if(FILIGREE_NODE AND bundler)
     COMMAND ${CMAKE_COMMAND} -E copy ${three}/LICENSE ${web_folder}/three-license.txt
     DEPENDS ${web}/index.html ${web}/filigree.css
     VERBATIM)
-  set(web_files ${web_folder}/filigree.js ${web_folder}/index.html ${web_folder}/filigree.css
+  # The page in which bodies move: the library's physics in its worker, and the runtime that restores.
+  set(live_files "")
+  if(FILIGREE_WASM_CLANG AND wasm_standard)
+    set(live ${CMAKE_CURRENT_BINARY_DIR}/web/live)
+    file(GLOB_RECURSE live_sources CONFIGURE_DEPENDS ${web}/live/* ${PROJECT_SOURCE_DIR}/src/filigree/physics/*
+         ${PROJECT_SOURCE_DIR}/src/filigree/core/* ${PROJECT_SOURCE_DIR}/include/filigree/*)
+    file(GLOB runtime_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/runtime/*.[ch] ${web}/filigree/*)
+    add_custom_command(
+      OUTPUT ${live}/live.wasm
+      COMMAND ${PROJECT_SOURCE_DIR}/scripts/wasm ${live}/live.wasm
+      DEPENDS ${live_sources} ${PROJECT_SOURCE_DIR}/scripts/wasm
+      COMMENT "Compiling the physics of live pages" VERBATIM)
+    add_custom_command(
+      OUTPUT ${live}/npm/filigree/wasm.js
+      COMMAND ${PROJECT_SOURCE_DIR}/scripts/npm ${live}/npm
+      DEPENDS ${runtime_sources} ${PROJECT_SOURCE_DIR}/scripts/npm
+      COMMENT "Building the npm package" VERBATIM)
+    set(bundle ${CMAKE_COMMAND} -E env NODE_PATH=${web}/node_modules ${FILIGREE_NODE} ${esbuild} --bundle --minify
+        --format=iife --target=es2022 --legal-comments=none --log-level=warning)
+    add_custom_command(
+      OUTPUT ${web_folder}/live.js ${web_folder}/live.html
+      COMMAND ${bundle} ${web}/live/worker.js --outfile=${live}/worker.txt --loader:.wasm=binary
+              --alias:filigree-live.wasm=${live}/live.wasm
+      COMMAND ${bundle} ${web}/live/main.js --outfile=${web_folder}/live.js --loader:.txt=text
+              --alias:filigree-live-worker.txt=${live}/worker.txt --alias:filigree=${live}/npm/filigree/filigree.js
+              --alias:filigree/three=${live}/npm/filigree/three.js
+      COMMAND ${CMAKE_COMMAND} -E copy ${web}/live/live.html ${web_folder}/live.html
+      DEPENDS ${live}/live.wasm ${live}/npm/filigree/wasm.js ${live_sources} ${web_sources} ${web}/package-lock.json
+      COMMENT "Bundling the live page" VERBATIM)
+    set(live_files ${web_folder}/live.js ${web_folder}/live.html)
+  endif()
+  set(web_files ${live_files} ${web_folder}/filigree.js ${web_folder}/index.html ${web_folder}/filigree.css
       ${web_folder}/three-license.txt)
   add_custom_target(filigree_web DEPENDS ${web_files})
   add_dependencies(filigree_cli filigree_web)

@@ -177,7 +177,7 @@ void run(const DropArguments& options, Session& session) {
 SceneFile default_drop_scene(const std::string& path, const Mesh& mesh) {
     DropArguments options;
     options.mesh = path;
-    return require(parse_scene(DropScene(options, mesh, path_of(path).generic_string()).text(), "scene of " + path));
+    return require(parse_scene(DropScene(options, mesh, path_of(path).generic_string()).text(), "scene of drop"));
 }
 
 Command drop_command() {

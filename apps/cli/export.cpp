@@ -10,7 +10,6 @@
 #include "filigree/file.h"
 #include "filigree/io/animation/point_cache.h"
 #include "filigree/io/gltf/gltf.h"
-#include "filigree/io/mesh/material_file.h"
 #include "filigree/io/model/model_file.h"
 #include "filigree/io/system/extension.h"
 #include "filigree/io/system/file.h"
@@ -86,18 +85,6 @@ void export_model(const Model& model, const PoseSequence& own, const ExportArgum
                            report);
 }
 
-/// What a page can show of the materials beside a model: PNG and JPEG, in the file.
-std::vector<MeshMaterial> page_materials(const Mesh& mesh, const std::string& input, Session& session) {
-    MeshMaterials found = read_materials_and_pictures(mesh, path_of(input));
-    for (MeshMaterial& material : found.materials) {
-        if (!material.picture_bytes || !picture_extension(*material.picture_bytes).empty()) continue;
-        found.warnings.push_back("The texture of " + material.name + " is neither PNG nor JPEG and was left out.");
-        material.picture_bytes = nullptr;
-    }
-    session.warn(found.warnings);
-    return std::move(found.materials);
-}
-
 /// The model as a coded file that comes level by level, with its poses.
 void export_stream(const Model& model, const PoseSequence& own, const ExportArguments& options, Session& session,
                    Report& report) {
@@ -110,12 +97,7 @@ void export_stream(const Model& model, const PoseSequence& own, const ExportArgu
         poses.frames_per_second = from.frames_per_second;
         for (std::size_t frame = 0; frame < from.frames; ++frame) poses.frames.push_back(require(from.frame(frame)));
     }
-    std::optional<Model> embedding; // where materials lie beside the model, one that has them inside
-    if (!model.mesh.materials.empty()) {
-        embedding = model;
-        embedding->mesh.embedded_materials = page_materials(model.mesh, options.input, session);
-        embedding->mesh.material_files.clear();
-    }
+    const std::optional<Model> embedding = with_page_materials(model, options.input, session);
     session.begin_writing(options.output);
     const PackReport coding =
         require(pack_model(embedding ? *embedding : model, poses, {.bits = options.bits, .levels = true},

@@ -11,6 +11,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -67,12 +68,15 @@ LiveWorld live_world(const SceneFile& scene, const ReadyScene& ready) {
 }
 
 /// Each model once, and which of them a body is.
-Json add_bodies(const ReadyScene& ready, PageFile& file, Json& head) {
+Json add_bodies(const ReadyScene& ready, PageFile& file, Json& head, Session& session) {
     std::map<const Body*, std::size_t> known;
     Json bodies = Json::array(), models = Json::array();
     for (const ReadyBody& body : ready.bodies) {
         const auto [found, is_new] = known.try_emplace(body.body.get(), known.size());
-        if (is_new) models.push_back(file.add(write_model(body.model)));
+        if (is_new) {
+            const std::optional<Model> embedding = with_page_materials(body.model, body.mesh_path, session);
+            models.push_back(file.add(write_model(embedding ? *embedding : body.model)));
+        }
         bodies.push_back({{"name", body.name},
                           {"model", found->second},
                           {"scale", body.scale},
@@ -126,7 +130,7 @@ void export_live_page(const SceneFile& scene, const std::string& folder_name, co
               {"gravity", numbers(ready.world.gravity)}};
     const std::string world = require(write_live_world(live_world(scene, ready)));
     head["world"] = file.add(world);
-    head["bodies"] = add_bodies(ready, file, head);
+    head["bodies"] = add_bodies(ready, file, head, session);
     head["obstacles"] = add_obstacles(scene, ready, file);
     session.begin_writing(folder_name);
     const std::string bytes = file.bytes(head);

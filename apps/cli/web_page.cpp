@@ -1,5 +1,6 @@
 #include "web_page.h"
 
+#include "filigree/io/mesh/material_file.h"
 #include "filigree/io/system/file.h"
 #include "filigree/io/system/platform.h"
 
@@ -62,7 +63,27 @@ std::string part_name(WebModel model, const std::string& name) {
     return name == "index.html" ? "live.html" : name == "filigree.js" ? "live.js" : name;
 }
 
+/// What a page can show of the materials beside a model: PNG and JPEG, in the file.
+std::vector<MeshMaterial> page_materials(const Mesh& mesh, const std::string& input, Session& session) {
+    MeshMaterials found = read_materials_and_pictures(mesh, path_of(input));
+    for (MeshMaterial& material : found.materials) {
+        if (!material.picture_bytes || !picture_extension(*material.picture_bytes).empty()) continue;
+        found.warnings.push_back("The texture of " + material.name + " is neither PNG nor JPEG and was left out.");
+        material.picture_bytes = nullptr;
+    }
+    session.warn(found.warnings);
+    return std::move(found.materials);
+}
+
 } // namespace
+
+std::optional<Model> with_page_materials(const Model& model, const std::string& input, Session& session) {
+    if (model.mesh.materials.empty()) return std::nullopt;
+    Model made = model;
+    made.mesh.embedded_materials = page_materials(model.mesh, input, session);
+    made.mesh.material_files.clear();
+    return made;
+}
 
 WebPage::WebPage(OutputFolder& folder, std::string title, WebModel model)
     : kind_(model), parts_(find_parts()), title_(std::move(title)), index_(folder.file("index.html")),

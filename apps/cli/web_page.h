@@ -5,6 +5,7 @@
 #include "session.h"
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 namespace filigree::cli {
@@ -32,5 +33,9 @@ private:
 
     void write_model_script(Session& session) const;
 };
+
+/// A model whose materials lie beside it, with those that a page can show inside: pictures that are PNG or JPEG. Empty:
+/// it has none. input: the model's file.
+std::optional<Model> with_page_materials(const Model& model, const std::string& input, Session& session);
 
 } // namespace filigree::cli

@@ -19,7 +19,7 @@ export class RestoredMesh extends DrivenMesh {
         super(geometry, material, new DriverSkeleton(model.info.driverVertices));
         this.model = model;
         this.#reach = reach;
-        this.update(model.driverRest);
+        this.update(model.driverRest, model.info.hasFit ? null : restGradients(model));
     }
 
     /** Moves the mesh to where the driver is, with gradients where there are any. */
@@ -61,9 +61,11 @@ function skinnedGeometry(model) {
 
 /** Positions at rest; model.normals has the normals. */
 function restOf(model) {
-    const gradients = new Float32Array(9 * model.info.driverVertices);
-    for (let k = 0; k < gradients.length; ++k) gradients[k] = k % 9 % 4 === 0 ? 1 : 0;
-    return model.restore(model.driverRest.slice(), { gradients }).positions;
+    return model.restore(model.driverRest.slice(), { gradients: restGradients(model) }).positions;
+}
+
+function restGradients(model) {
+    return Float32Array.from({ length: 9 * model.info.driverVertices }, (_, k) => (k % 9 % 4 === 0 ? 1 : 0));
 }
 
 /** One vertex for each pair of a vertex and its normal and UV, where corners have their own; else the model's. */

@@ -89,6 +89,7 @@ export class Stage {
     const lines = new THREE.Mesh(disc, this.grid);
     shadow.renderOrder = lines.renderOrder = -1;
     floor.add(shadow, lines);
+    this.floor = floor;
     return floor;
   }
 
