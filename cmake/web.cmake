@@ -59,10 +59,9 @@ if(FILIGREE_NODE AND bundler)
     DEPENDS ${web_sources} ${web}/package-lock.json ${decoder}
     COMMENT "Bundling the web page" VERBATIM)
   add_custom_command(
-    OUTPUT ${web_folder}/index.html ${web_folder}/filigree.css ${web_folder}/three-license.txt
+    OUTPUT ${web_folder}/index.html ${web_folder}/filigree.css
     COMMAND ${CMAKE_COMMAND} -E copy ${web}/index.html ${web_folder}/index.html
     COMMAND ${CMAKE_COMMAND} -E copy ${web}/filigree.css ${web_folder}/filigree.css
-    COMMAND ${CMAKE_COMMAND} -E copy ${three}/LICENSE ${web_folder}/three-license.txt
     DEPENDS ${web}/index.html ${web}/filigree.css
     VERBATIM)
   # The page in which bodies move: the library's physics in its worker, and the runtime that restores.
@@ -96,11 +95,35 @@ if(FILIGREE_NODE AND bundler)
       COMMENT "Bundling the live page" VERBATIM)
     set(live_files ${web_folder}/live.js ${web_folder}/live.html)
   endif()
-  set(web_files ${live_files} ${web_folder}/filigree.js ${web_folder}/index.html ${web_folder}/filigree.css
-      ${web_folder}/three-license.txt)
+
+  # The licences of all that the script holds, for the page's folder.
+  set(notices "This page holds the programs below. Their licences ask that these texts go with it.\n")
+  function(add_notice name file otherwise)
+    if(EXISTS ${file})
+      file(READ ${file} text)
+    else()
+      set(text "${otherwise}\n")
+    endif()
+    string(REPEAT "-" 78 line)
+    string(APPEND notices "\n${line}\n${name}\n${line}\n\n${text}")
+    set(notices "${notices}" PARENT_SCOPE)
+  endfunction()
+  add_notice("Filigree" ${PROJECT_SOURCE_DIR}/LICENSE "MIT")
+  add_notice("three.js, which draws" ${three}/LICENSE "MIT")
+  if(FILIGREE_WASM_CLANG AND wasm_standard)
+    set(notes /usr/share/doc)
+    add_notice("Eigen, in the decoder of streams. Its source is Debian's package eigen3, or eigen.tuxfamily.org."
+               ${notes}/libeigen3-dev/copyright "Mozilla Public License 2.0")
+    add_notice("libc++ of LLVM, in the decoder of streams" ${notes}/libc++-16-dev-wasm32/copyright
+               "Apache License 2.0 with LLVM exceptions")
+    add_notice("WASI libc, in the decoder of streams" ${notes}/wasi-libc/copyright "CC0, MIT, BSD")
+  endif()
+  file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/web/licenses.txt "${notices}")
+  file(COPY ${CMAKE_CURRENT_BINARY_DIR}/web/licenses.txt DESTINATION ${web_folder})
+  set(web_files ${live_files} ${web_folder}/filigree.js ${web_folder}/index.html ${web_folder}/filigree.css)
   add_custom_target(filigree_web DEPENDS ${web_files})
   add_dependencies(filigree_cli filigree_web)
-  install(FILES ${web_files} DESTINATION ${CMAKE_INSTALL_DATADIR}/filigree/web COMPONENT programs)
+  install(FILES ${web_files} ${web_folder}/licenses.txt DESTINATION ${CMAKE_INSTALL_DATADIR}/filigree/web COMPONENT programs)
 else()
   message(STATUS "No web page: node or web/node_modules is missing; scripts/setup installs them")
 endif()

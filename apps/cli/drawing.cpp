@@ -5,6 +5,7 @@
 
 #include "filigree/io/system/file.h"
 #include "filigree/present/error_picture.h"
+#include "filigree/present/film_frames.h"
 #include "filigree/present/page.h"
 #include "filigree/present/patch_drawing.h"
 #include "filigree/present/scene_film.h"
@@ -105,6 +106,87 @@ void draw_points_inside(const Mesh& mesh, const std::vector<Vec3f>& points, doub
     }
     write_picture_of(scene, camera_for(mesh, View::iso, up, 4.0 / 3), {.width = 1280, .height = 960}, path, renderer,
                      session);
+}
+
+void check_png(const std::string& bytes, const std::string& path) { require(decode_picture(bytes, path)); }
+
+namespace {
+
+constexpr std::size_t kPosterMoments = 24, kPosterTriangles = 300'000;
+
+/// mesh: the first moment; reached: places of all moments, relative to its origin.
+void draw_poster(const Mesh& mesh, const std::vector<Vec3f>& reached, const SurfaceMaterials& materials,
+                 const std::string& path, const RunContext& context) {
+    // The page's: web/src/stage.js, model.js, filigree.css.
+    const Vec3d direction = Vec3d(0.45, 0.32, 1).normalized(), up = Vec3d::UnitY();
+    const Background background{.top = {0.965f, 0.969f, 0.976f}, .bottom = {0.867f, 0.882f, 0.906f}};
+    const Vec3f clay{0.725f, 0.647f, 0.549f};
+    constexpr unsigned kWidth = 1200, kHeight = 630; // as services that show a link ask for
+
+    HeadlessRenderer renderer = require(HeadlessRenderer::create());
+    SurfaceOptions options;
+    options.materials = materials.materials;
+    const Drawable drawable = require(Drawable::surface(mesh, options, context));
+    const CameraPoints points{reached, mesh.origin};
+    const Camera camera = fit_camera(std::span(&points, 1), direction, up, double(kWidth) / kHeight, 30, 0.09);
+    const Scene scene{.objects = {{&drawable, {.color = clay}}}, .background = background};
+    const PictureOptions size{.width = kWidth, .height = kHeight, .passes = 10};
+    require(write_file(path_of(path), encode_jpeg(require(renderer.picture(scene, camera, size, context)))));
+}
+
+/// A page is none the worse without a poster.
+void try_poster(Session& session, const std::function<void(const RunContext&)>& draw) {
+    try {
+        draw(session.silent_context());
+    } catch (const Failure& failure) {
+        if (failure.error.code == ErrorCode::cancelled) throw;
+        session.warn("The page has no poster: " + failure.error.message);
+    }
+}
+
+/// Vertices of faces that are to be seen: key frames at other times are scaled to nothing.
+void add_seen(const Mesh& mesh, std::vector<Vec3f>& points) {
+    for (std::size_t face = 0; face < mesh.face_count(); ++face) {
+        const std::span<const Index> corners = mesh.face(face);
+        const Vec3f& first = mesh.positions[corners[0]];
+        if (std::all_of(corners.begin(), corners.end(), [&](Index v) { return mesh.positions[v] == first; })) continue;
+        points.push_back(first);
+    }
+}
+
+} // namespace
+
+void draw_poster(const Model& model, const FrameSource<Pose>& poses, const std::string& materials_beside,
+                 const std::string& path, Session& session) {
+    try_poster(session, [&](const RunContext& context) {
+        const RestoreOptions level{.level = level_within(model, kPosterTriangles)};
+        const Restorer restorer = require(Restorer::create(model, level, context));
+        const Pose first = poses.frames > 0 ? require(poses.frame(0)) : rest_pose(model);
+        const Mesh mesh = require(restorer.mesh(first, context));
+        std::vector<Vec3f> reached = mesh.positions;
+        for (std::size_t k = 1; k < kPosterMoments && poses.frames > 1; ++k) {
+            const Pose pose = require(poses.frame(k * (poses.frames - 1) / (kPosterMoments - 1)));
+            reached.insert(reached.end(), pose.positions.begin(), pose.positions.end());
+        }
+        draw_poster(mesh, reached, load_surface_materials(mesh, path_of(materials_beside)), path, context);
+    });
+}
+
+void draw_poster(const GltfScene& scene, const std::string& path, Session& session) {
+    try_poster(session, [&](const RunContext& context) {
+        std::vector<Vec3f> reached;
+        Mesh first = scene.mesh();
+        if (!scene.animations().empty()) {
+            const auto& [name, begin, end] = scene.animations().front();
+            first = require(scene.mesh_at(0, begin, context));
+            for (std::size_t k = 0; k < kPosterMoments; ++k)
+                add_seen(require(scene.mesh_at(0, begin + (end - begin) * double(k) / (kPosterMoments - 1), context)),
+                         reached);
+        } else {
+            add_seen(first, reached);
+        }
+        draw_poster(first, reached, load_surface_materials(first, {}), path, context);
+    });
 }
 
 std::vector<std::string> draw_demo(const DemoScene& scene, const std::function<Pose(double)>& pose_at,

@@ -4,6 +4,7 @@
 
 #include "pictures.h"
 
+#include "filigree/io/gltf/gltf.h"
 #include "filigree/mesh.h"
 #include "filigree/remesh.h"
 #include "filigree/restore.h"
@@ -38,6 +39,17 @@ void draw_quads(const QuadRemeshed& result, View view, UpAxis up, const std::str
 /// Points blue, surface red, the half of the surface towards the viewer cut away.
 void draw_points_inside(const Mesh& mesh, const std::vector<Vec3f>& points, double spacing, UpAxis up,
                         const std::string& path, Session& session);
+
+/// Refuses a PNG that cannot be decoded. A program without the renderer takes all.
+void check_png(const std::string& bytes, const std::string& path);
+
+/// What a page shows while it loads: a JPEG of 1200 by 630 pixels with the first moment, from where the page's camera
+/// is, so that all moments fit. poses: empty where the model is at rest. materials_beside: the file that the model came
+/// from. What keeps the picture from being drawn becomes a warning, and there is no file.
+void draw_poster(const Model& model, const FrameSource<Pose>& poses, const std::string& materials_beside,
+                 const std::string& path, Session& session);
+/// The same of a GLB.
+void draw_poster(const GltfScene& scene, const std::string& path, Session& session);
 
 struct DemoScene {
     const Mesh& mesh;          ///< as it came

@@ -36,6 +36,13 @@ void draw_points_inside(const Mesh&, const std::vector<Vec3f>&, double, UpAxis, 
     refuse_to_draw(path);
 }
 
+void check_png(const std::string&, const std::string&) {}
+constexpr const char* kNoPoster = "The page has no poster, as this program was built without the renderer.";
+void draw_poster(const Model&, const FrameSource<Pose>&, const std::string&, const std::string&, Session& session) {
+    session.warn(kNoPoster);
+}
+void draw_poster(const GltfScene&, const std::string&, Session& session) { session.warn(kNoPoster); }
+
 std::vector<std::string> draw_demo(const DemoScene&, const std::function<Pose(double)>&, const std::string&,
                                    const std::string&, Session& session) {
     session.warn("No picture and no film: this program was built without the renderer.");

@@ -168,7 +168,9 @@ void run(const DropArguments& options, Session& session) {
     if (!options.run.outputs.empty()) return run_scene(std::move(scene), options.run, session);
     Report report;
     if (!options.scene.empty()) report.add("scene", options.scene, "scene", options.scene);
-    if (!options.page.empty()) export_live_page(scene, options.page, options.mesh, session, report);
+    if (!options.page.empty())
+        export_live_page(scene, options.page, options.mesh, {path_of(options.mesh).stem().string(), "", false}, session,
+                         report);
     session.print(report);
 }
 

@@ -1,6 +1,7 @@
 #include "animation_output.h"
 #include "coding_report.h"
 #include "commands.h"
+#include "drawing.h"
 #include "drop.h"
 #include "live_page.h"
 #include "pictures.h"
@@ -27,7 +28,8 @@ namespace fs = std::filesystem;
 struct ExportArguments {
     std::string input, output, poses;
     PoseFileOptions pose_file;
-    bool at_rest = false, web = false, stream = false, live = false;
+    bool at_rest = false, web = false, stream = false, live = false, no_poster = false;
+    std::string title, logo;
     unsigned bits = 14;
     RestoreOptions restore;
     AnimationOutput animation;
@@ -112,6 +114,11 @@ void export_stream(const Model& model, const PoseSequence& own, const ExportArgu
     if (coding.lacks_level_attributes) session.warn(kLevelsLackAttributes);
 }
 
+WebLook look_of(const ExportArguments& options) {
+    return {options.title.empty() ? path_of(options.input).stem().string() : options.title, options.logo,
+            !options.no_poster && !options.live};
+}
+
 /// A folder with a page that plays a GLB as it is, such as the key frames that `simulate` writes of what melts.
 void export_glb_page(const ExportArguments& options, const std::string& glb, Session& session, Report& report) {
     if (!glb.starts_with("glTF")) {
@@ -130,9 +137,10 @@ void export_glb_page(const ExportArguments& options, const std::string& glb, Ses
                                           "' beside it, and the page shows a GLB that holds all of its parts.");
     session.warn(scene.warnings());
     OutputFolder folder(path_of(options.output), path_of(options.input));
-    WebPage page(folder, path_of(options.input).stem().string(), WebModel::glb);
+    WebPage page(folder, look_of(options), WebModel::glb);
     session.begin_writing(options.output);
     require(write_file(path_of(page.model_path()), glb));
+    if (!page.poster_path().empty()) draw_poster(scene, page.poster_path(), session);
     page.write(session);
     folder.keep();
     const std::string index = (path_of(options.output) / "index.html").string();
@@ -146,13 +154,20 @@ void export_page(const Model& model, const PoseSequence& own, ExportArguments op
     const std::string folder_name = options.output;
     OutputFolder folder(path_of(folder_name), path_of(options.input));
     folder.protect(animation_files(path_of(options.poses)));
-    WebPage page(folder, path_of(options.input).stem().string(), options.stream ? WebModel::stream : WebModel::glb);
+    WebPage page(folder, look_of(options), options.stream ? WebModel::stream : WebModel::glb);
     options.output = page.model_path();
     options.animation.skin.all_levels = true;
     if (options.stream)
         export_stream(model, own, options, session, report);
     else
         export_model(model, own, options, session, report);
+    if (!page.poster_path().empty()) {
+        const bool moves = !options.at_rest && (!options.poses.empty() || !own.empty());
+        draw_poster(model,
+                    moves ? poses_of(options.poses, options.pose_file, model, own, options.input, session)
+                          : FrameSource<Pose>(),
+                    options.input, page.poster_path(), session);
+    }
     page.write(session);
     folder.keep();
     const std::string index = (path_of(folder_name) / "index.html").string();
@@ -166,18 +181,20 @@ void export_live(const ExportArguments& options, Session& session) {
     const std::string given =
         session.first_given({"--poses", "--frame-rate", "--animation", "--rest", "--stream", "--bits", "--as",
                              "--key-rate", "--interpolation", "--influences", "--full-precision", "--compress",
-                             "--all-levels", "--no-normals", "--morph-normals", "--level", "--pose-up"});
+                             "--all-levels", "--no-normals", "--morph-normals", "--level", "--pose-up", "--no-poster"});
     if (!given.empty()) refuse(given + " belongs to pages that play a motion; in a page with --live bodies move.");
     const double start = now_seconds();
     Report report;
     report.set("output", options.output);
     if (lower_extension(path_of(options.input)) == ".toml") {
-        export_live_page(require(read_scene(options.input)), options.output, options.input, session, report);
+        export_live_page(require(read_scene(options.input)), options.output, options.input, look_of(options), session,
+                         report);
     } else {
         const Session::Content content = session.read_any(session.open(options.input), options.input);
         const auto* model = std::get_if<Model>(&content.value);
         const Mesh& mesh = model ? model->mesh : std::get<Mesh>(content.value);
-        export_live_page(default_drop_scene(options.input, mesh), options.output, options.input, session, report);
+        export_live_page(default_drop_scene(options.input, mesh), options.output, options.input, look_of(options),
+                         session, report);
     }
     const double seconds = now_seconds() - start;
     report.add("seconds", fmt::format("{:.3g}", seconds), "export_seconds", seconds);
@@ -188,6 +205,11 @@ void run(const ExportArguments& options, Session& session) {
     if (options.at_rest && !options.poses.empty()) refuse("--rest leaves the poses out that --poses names.");
     if (options.web && options.animation.compress)
         refuse("--compress is for other programs' viewers; --stream makes the page's model small.");
+    if (!options.web)
+        if (const std::string given = session.first_given({"--title", "--logo", "--no-poster"}); !given.empty())
+            refuse(given + " belongs to --web.");
+    if (!session.first_given({"--title"}).empty() && options.title.find_first_not_of(" \t\r\n") == std::string::npos)
+        refuse("--title: is empty; leave it out for the file's name.");
     if (options.stream && !options.web) refuse("--stream belongs to --web; 'filigree pack' writes a stream alone.");
     if (options.live) return export_live(options, session);
     if (!options.web) {
@@ -246,6 +268,10 @@ Command export_command() {
                 Option("--live", options->live,
                        "With --web: write a page in which the bodies of a scene (.toml) move and can be pulled; a "
                        "model or a mesh falls as in 'filigree drop' (docs/live.md)"),
+                Option("--title", options->title, "With --web: heading of the page (default: the file's name)"),
+                Option("--logo", options->logo, "With --web: SVG or PNG beside the heading").is_read(),
+                Option("--no-poster", options->no_poster,
+                       "With --web: no poster.jpg, the picture that is shown while the page loads"),
                 Option("--bits", options->bits, "With --stream: bits of a position, along the longest side of the box")
                     .between(10, 16)
                     .with_default()} +
@@ -254,7 +280,7 @@ Command export_command() {
                     "  filigree export bounce.fil -o bounce.glb --key-rate 30 --interpolation cubic\n"
                     "  filigree export scan.fil --poses driver.pc2 -o scan.pc2\n"
                     "  filigree export scan.fil -o levels.glb\n"
-                    "  filigree export bounce.fil -o page/ --web\n"
+                    "  filigree export bounce.fil -o page/ --web --title \"Spring catalogue\" --logo mark.svg\n"
                     "  filigree export ice.glb -o page/ --web\n"
                     "  filigree export bounce.fil -o page/ --web --stream\n"
                     "  filigree export scene.toml -o page/ --web --live",

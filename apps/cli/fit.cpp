@@ -171,7 +171,8 @@ private:
 
     void write_page(const std::string& path, Report& report) {
         OutputFolder folder(path_of(path), path_of(options_.input));
-        WebPage page(folder, path_of(options_.input).stem().string(), WebModel::glb);
+        WebPage page(folder, {.title = path_of(options_.input).stem().string(), .logo = {}, .poster = false},
+                     WebModel::glb);
         AnimationOutput animation = options_.animation;
         animation.skin.all_levels = true;
         write_animation_output(fitted_.model, frames_of(fitted_.poses), {}, animation, page.model_path(),

@@ -115,13 +115,13 @@ Json add_obstacles(const SceneFile& scene, const ReadyScene& ready, PageFile& fi
 } // namespace
 
 void export_live_page(const SceneFile& scene, const std::string& folder_name, const std::string& input,
-                      Session& session, Report& report) {
+                      const WebLook& look, Session& session, Report& report) {
     OutputFolder folder(path_of(folder_name), path_of(input));
     std::vector<fs::path> meshes;
     for (const SceneBody& body : scene.bodies) meshes.push_back(path_of(body.mesh));
     for (const SceneObstacle& obstacle : scene.obstacles) meshes.push_back(path_of(obstacle.mesh));
     folder.protect(meshes);
-    WebPage page(folder, path_of(input).stem().string(), WebModel::live);
+    WebPage page(folder, look, WebModel::live);
     const ReadyScene ready = require(set_up(scene, session.context()));
     session.warn(ready.warnings);
     PageFile file;

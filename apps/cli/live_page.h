@@ -3,6 +3,7 @@
 
 #include "report.h"
 #include "session.h"
+#include "web_page.h"
 
 #include "filigree/scene.h"
 
@@ -11,8 +12,9 @@
 namespace filigree::cli {
 
 /// Sets the scene up and writes the page; nothing is simulated. folder: where the page goes. input: the file that the
-/// user named, which is not written over. Fails as set_up does; unsuitable: a body that cannot move in a page.
-void export_live_page(const SceneFile& scene, const std::string& folder, const std::string& input, Session& session,
-                      Report& report);
+/// user named, which is not written over. look: the heading and the logo; no poster. Fails as set_up does; unsuitable:
+/// a body that cannot move in a page.
+void export_live_page(const SceneFile& scene, const std::string& folder, const std::string& input, const WebLook& look,
+                      Session& session, Report& report);
 
 } // namespace filigree::cli

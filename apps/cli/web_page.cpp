@@ -1,4 +1,5 @@
 #include "web_page.h"
+#include "drawing.h"
 
 #include "filigree/io/mesh/material_file.h"
 #include "filigree/io/system/file.h"
@@ -6,6 +7,9 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <map>
+
+#include <fmt/format.h>
 
 namespace filigree::cli {
 
@@ -30,14 +34,43 @@ fs::path find_parts() {
                "scripts/setup and build again, or say with FILIGREE_WEB where they are.");
 }
 
-std::string replaced(std::string text, std::string_view what, const std::string& by) {
-    for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + by.size()))
-        text.replace(at, what.size(), by);
-    return text;
+/// For the text of an element and for a value in quotes: nothing in it starts a tag or ends the value.
+std::string html_text(const std::string& text) {
+    std::string safe;
+    for (const char c : text) switch (c) {
+        case '&':
+            safe += "&amp;";
+            break;
+        case '<':
+            safe += "&lt;";
+            break;
+        case '>':
+            safe += "&gt;";
+            break;
+        case '"':
+            safe += "&quot;";
+            break;
+        case '\'':
+            safe += "&#39;";
+            break;
+        default:
+            safe += static_cast<unsigned char>(c) < ' ' ? ' ' : c;
+        }
+    return safe;
 }
 
-std::string html_text(const std::string& text) {
-    return replaced(replaced(replaced(text, "&", "&amp;"), "<", "&lt;"), ">", "&gt;");
+/// The page, with a value for each {{name}}. A value is text: what looks like a name in it stays as it is.
+std::string filled(std::string_view page, const std::map<std::string, std::string, std::less<>>& values) {
+    std::string result;
+    for (std::size_t at = 0; at < page.size();) {
+        const std::size_t begin = std::min(page.find("{{", at), page.size());
+        result += page.substr(at, begin - at);
+        if (begin == page.size()) break;
+        const std::size_t end = page.find("}}", begin);
+        result += values.find(page.substr(begin + 2, end - begin - 2))->second;
+        at = end + 2;
+    }
+    return result;
 }
 
 std::string base64(std::string_view bytes) {
@@ -52,6 +85,36 @@ std::string base64(std::string_view bytes) {
         for (std::size_t k = 0; k < 4; ++k) text += k <= count ? kLetters[bits >> (18 - 6 * k) & 63] : '=';
     }
     return text;
+}
+
+bool is_png(std::string_view bytes) { return bytes.starts_with("\x89PNG\r\n\x1a\n"); }
+
+/// Whether it begins and ends as an SVG, which is all that can be said of XML without reading it.
+bool looks_like_svg(std::string_view bytes) {
+    const std::size_t last = bytes.find_last_not_of(" \t\r\n");
+    if (last == std::string_view::npos) return false;
+    const std::string_view text = bytes.substr(0, last + 1),
+                           end = text.substr(text.size() - std::min<std::size_t>(text.size(), 6));
+    const std::size_t root = text.find("<svg");
+    return root != std::string_view::npos && text.find_first_not_of("\xef\xbb\xbf \t\r\n") == text.find('<') &&
+           (end == "</svg>" || end.ends_with("/>") || end.ends_with("-->"));
+}
+
+/// The logo as an element. It is an image inside the page: a browser runs no script of it and fetches nothing for it.
+std::string logo_element(const std::string& path) {
+    if (path.empty()) return "";
+    constexpr std::size_t kMostBytes = 1 << 20; // it is in the page itself, which is read before all else
+    const std::string bytes = require(read_file(path_of(path)));
+    if (bytes.size() > kMostBytes)
+        refuse(ErrorCode::unsuitable, fmt::format("{}: has {:.1f} MB, and a logo has at most 1 MB; make it smaller.",
+                                                  path, double(bytes.size()) / 1e6));
+    const bool png = is_png(bytes);
+    if (!png && !looks_like_svg(bytes))
+        refuse(ErrorCode::unsupported,
+               path + ": is neither an SVG nor a PNG, or is cut off; --logo takes a picture in one of these formats.");
+    if (png) check_png(bytes, path);
+    return fmt::format(R"(<img id="logo" alt="" src="data:image/{};base64,{}">)", png ? "png" : "svg+xml",
+                       base64(bytes));
 }
 
 std::string model_name(WebModel model) {
@@ -85,11 +148,11 @@ std::optional<Model> with_page_materials(const Model& model, const std::string& 
     return made;
 }
 
-WebPage::WebPage(OutputFolder& folder, std::string title, WebModel model)
-    : kind_(model), parts_(find_parts()), title_(std::move(title)), index_(folder.file("index.html")),
-      script_(folder.file("filigree.js")), style_(folder.file("filigree.css")),
-      license_(folder.file("three-license.txt")), model_(folder.file(model_name(model))),
-      model_script_(folder.file(model_name(model) + ".js")) {
+WebPage::WebPage(OutputFolder& folder, const WebLook& look, WebModel model)
+    : kind_(model), parts_(find_parts()), title_(html_text(look.title)), logo_(logo_element(look.logo)),
+      index_(folder.file("index.html")), script_(folder.file("filigree.js")), style_(folder.file("filigree.css")),
+      licenses_(folder.file("licenses.txt")), model_(folder.file(model_name(model))),
+      model_script_(folder.file(model_name(model) + ".js")), poster_(look.poster ? folder.file("poster.jpg") : "") {
 #ifndef FILIGREE_WEB_STREAMS
     if (model == WebModel::stream)
         refuse(ErrorCode::unsupported,
@@ -103,10 +166,20 @@ WebPage::WebPage(OutputFolder& folder, std::string title, WebModel model)
 }
 
 void WebPage::write(Session& session) {
-    const std::string index = require(read_file(parts_ / part_name(kind_, "index.html")));
-    const std::string titled = replaced(index, "{{title}}", html_text(title_));
-    require(write_file(path_of(index_), replaced(titled, "{{model}}", kind_ == WebModel::glb ? "glb" : "stream")));
-    for (const std::string& file : {script_, style_, license_})
+    std::error_code failed;
+    const bool has_poster = !poster_.empty() && fs::exists(path_of(poster_), failed);
+    const std::string page =
+        filled(require(read_file(parts_ / part_name(kind_, "index.html"))),
+               {{"title", title_},
+                {"logo", logo_},
+                {"model", kind_ == WebModel::glb ? "glb" : "stream"},
+                {"bytes", std::to_string(fs::file_size(path_of(model_)))},
+                {"poster", has_poster ? R"(<img id="poster" src="poster.jpg" alt="">)" : ""},
+                {"poster_tags", has_poster ? "<meta property=\"og:image\" content=\"poster.jpg\">\n"
+                                             "<meta name=\"twitter:card\" content=\"summary_large_image\">\n"
+                                           : ""}});
+    require(write_file(path_of(index_), page));
+    for (const std::string& file : {script_, style_, licenses_})
         require(write_file(path_of(file),
                            require(read_file(parts_ / part_name(kind_, path_of(file).filename().string())))));
     write_model_script(session);

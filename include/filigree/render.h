@@ -58,6 +58,10 @@ Result<Picture> read_picture(const std::filesystem::path& path);
 /// for a picture without pixels.
 std::string encode_png(const Picture& picture);
 
+/// The bytes of a JPEG file, quality 90, without chroma subsampling; transparent parts become white. Empty for a
+/// picture without pixels.
+std::string encode_jpeg(const Picture& picture);
+
 /// Root mean square difference of two pictures over all channels, 0 to 255; infinite when their sizes differ.
 double picture_distance(const Picture& a, const Picture& b);
 

@@ -8,6 +8,7 @@ import { root } from './tools.mjs';
 
 const [program, folder] = process.argv.slice(2);
 const kFrames = 9, kRate = 12;
+const kPageTitle = '"Cube" <script>alert(3)</script> & {{model}}'; // as CMakeLists.txt has it
 
 rmSync(folder, { recursive: true, force: true });
 mkdirSync(join(folder, 'poses'), { recursive: true });
@@ -49,12 +50,13 @@ filigree('export', ...moving, '-o', 'skin_levels.glb', '--all-levels', '--interp
 filigree('export', ...moving, '-o', 'skin_6.glb', '--influences', '6', '--full-precision');
 filigree('export', ...moving, '-o', 'skin_flat.glb', '--no-normals', '--key-rate', '6');
 filigree('export', ...moving, '-o', 'morph.glb', '--as', 'morph', '--morph-normals');
-filigree('export', ...moving, '-o', 'page', '--web');
-filigree('export', ...moving, '-o', 'stream_page', '--web', '--stream');
+writeFileSync(join(folder, 'mark.svg'), '<svg xmlns="http://www.w3.org/2000/svg" width="40" height="40" onload="alert(1)"><script>alert(2)</script><circle cx="20" cy="20" r="18"/></svg>');
+filigree('export', ...moving, '-o', 'page', '--web', '--title', kPageTitle, '--logo', 'mark.svg');
+filigree('export', ...moving, '-o', 'stream_page', '--web', '--stream', '--no-poster');
 filigree('make', 'wavy-sphere', '-o', 'sphere.ply', '--resolution', '48');
 filigree('strip', 'sphere.ply', '-o', 'sphere.fil', '--base', '150');
 filigree('deform', 'sphere.fil', '-o', 'sphere_moved.fil', '--twist', '60', '--frames', '5');
-filigree('export', 'sphere_moved.fil', '-o', 'near_page', '--web', '--stream');
+filigree('export', 'sphere_moved.fil', '-o', 'near_page', '--web', '--stream', '--no-poster');
 filigree('restore', 'stream_page/model.fil', '--frame', String(kFrames), '-o', 'stream_last.obj');
 filigree('export', ...moving, '-o', 'compressed.glb', '--compress');
 
@@ -89,7 +91,7 @@ writeFileSync(join(folder, 'painted.mtl'), 'newmtl red\nKd 1 1 1\nmap_Kd stripes
 writeFileSync(join(folder, 'painted.obj'), tube(96, 64, 'painted.mtl'));
 filigree('strip', 'painted.obj', '-o', 'painted.fil', '--base', '60');
 filigree('deform', 'painted.fil', '-o', 'painted_moved.fil', '--bend', '20', '--frames', '5');
-filigree('export', 'painted_moved.fil', '-o', 'painted_page', '--web', '--stream');
+filigree('export', 'painted_moved.fil', '-o', 'painted_page', '--web', '--stream', '--no-poster');
 filigree('export', 'tube.fil', '-o', 'tube.glb');
 filigree('deform', 'tube.fil', '-o', 'tube_moved.fil', '--bend', '60', '--frames', '5');
 filigree('export', 'tube_moved.fil', '-o', 'tube_skin.glb');
@@ -120,7 +122,7 @@ centre = [0, 0.12, 0]
 shape = "ground"
 `);
 filigree('simulate', 'melt.toml', '-o', 'melt.glb');
-filigree('export', 'melt.glb', '-o', 'melt_page', '--web');
+filigree('export', 'melt.glb', '-o', 'melt_page', '--web', '--no-poster');
 
 // Far from the origin, where 32-bit float is coarse.
 const far = tube(24, 16, 'tube.mtl').trimEnd().split('\n').map((line) => line.replace(/^v (\S+) (\S+) (\S+)$/, (_, x, y, z) => `v ${Number(x) + 1e5} ${Number(y) - 2e5} ${Number(z) + 3e5}`));

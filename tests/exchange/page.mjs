@@ -1,6 +1,6 @@
 // Opens a page of `filigree export --web`, from disk and from a server, and uses it as a visitor would.
-// Usage: node page.mjs FOLDER [--pictures FOLDER] [--key-frames]
-// --key-frames: of a film whose faces change.
+// Usage: node page.mjs FOLDER [--pictures FOLDER] [--key-frames] [--title TEXT]
+// --key-frames: of a film whose faces change. --title: what the page has to be called, beside a logo.
 // Fails where anything is asked of the network, the browser complains, the model is not to be seen, or a control does
 // nothing.
 import { mkdirSync } from 'node:fs';
@@ -65,15 +65,23 @@ async function asks_elsewhere(page) {
 }
 
 /// Uses the page; returns what went wrong. thorough: every control, not only that the model is there and moves.
-async function visit(browser, url, { thorough, pictures, key_frames }) {
+async function visit(browser, url, { thorough, pictures, key_frames, title }) {
     const { page, foreign, complaints } = await watched_page(browser, new URL('.', url).href);
     const wrong = [];
     const check = (holds, sentence) => { if (!holds) wrong.push(sentence); };
-    await page.goto(url);
+    await page.goto(thorough ? `${url}?details` : url);
     await on_page.ready(page);
+    check(await page.evaluate(() => document.getElementById('panel').open) === thorough, 'the panel is open without ?details, or closed with it');
     const failure = await on_page.failure(page);
     if (failure) return [...complaints, failure];
 
+    const brand = await page.evaluate(() => {
+        const logo = document.getElementById('logo');
+        return { title: document.title, heading: document.querySelector('h1').textContent, logo: logo && logo.naturalWidth, scripts: document.scripts.length };
+    });
+    check(brand.title === brand.heading && brand.scripts <= 2, `the page calls itself ${JSON.stringify(brand)}`);
+    if (title) check(brand.title === title, `its title is ${brand.title}`);
+    if (title) check(brand.logo > 0, 'its logo is not to be seen');
     const model = await page.evaluate(() => ({
         levels: filigree.model.levels.length, duration: filigree.model.duration, has_driver: Boolean(filigree.driver),
         key_frames: filigree.model.key_frames.map(({ time, counts }) => ({ time, triangles: counts.triangles })) }));
@@ -92,6 +100,18 @@ async function visit(browser, url, { thorough, pictures, key_frames }) {
     if (!thorough) return leave();
     const seek = (seconds) => page.evaluate((time) => filigree.seek(time), seconds);
     await seek(0);
+    const room = await page.evaluate(() => {
+        const { stage, model } = filigree, p = stage.centre.clone(), reach = [Infinity, -Infinity, Infinity, -Infinity];
+        for (let i = 0; i < model.reached.length; i += 3) {
+            p.fromArray(model.reached, i).project(stage.camera);
+            const x = (0.5 + 0.5 * p.x) * innerWidth, y = (0.5 - 0.5 * p.y) * innerHeight;
+            [x, -x, y, -y].forEach((value, k) => { reach[k] = k % 2 ? Math.max(reach[k], -value) : Math.min(reach[k], value); });
+        }
+        const { width, height } = stage.free, header = document.querySelector('header').offsetHeight;
+        return { left: reach[0], right: width - reach[1], top: reach[2] - header, bottom: header + height - reach[3], across: (reach[1] - reach[0]) / width, upwards: (reach[3] - reach[2]) / height };
+    });
+    check(Math.min(room.left, room.right, room.top, room.bottom) > 0, `the motion leaves the picture: ${JSON.stringify(room)}`);
+    check(Math.max(room.across, room.upwards) > 0.75, `the motion is small in the picture: ${JSON.stringify(room)}`);
     const start = await on_page.picture(page);
     await page.evaluate(() => { filigree.model.scene.visible = false; filigree.draw(); });
     const empty = await on_page.picture(page);
@@ -151,31 +171,49 @@ async function visit(browser, url, { thorough, pictures, key_frames }) {
     return leave();
 }
 
+/// What is to be seen while the model comes: its poster, and how much of it is there. Returns what went wrong.
+async function wait_for(browser, base) {
+    const { page } = await watched_page(browser, base), wrong = [];
+    await page.goto(`${base}/index.html`, { waitUntil: 'commit' });
+    const told = await page.waitForFunction(() => document.getElementById('loading-text')?.textContent.match(/ ([1-9][0-9]?) % of /)?.[1], null, { timeout: 60000 })
+        .then((found) => found.jsonValue(), () => undefined);
+    if (!told) wrong.push('how much of the model has come is not told');
+    const poster = await page.evaluate(() => document.getElementById('poster')?.naturalWidth);
+    if (poster !== 1200) wrong.push(`the poster is ${poster} pixels wide while the model comes`);
+    await page.waitForFunction(() => window.filigree && !document.getElementById('poster') && !document.getElementById('loading'), null, { timeout: 60000 })
+        .catch(() => wrong.push('the poster stays'));
+    await page.close();
+    return wrong;
+}
+
 /// Everything there is to check of one folder; returns what went wrong.
-export async function check_page(folder, pictures, key_frames = false) {
+export async function check_page(folder, pictures, key_frames = false, title = '') {
     const browser = await open_browser();
     const server = await serve(folder);
     const broken = await serve(folder, { '/model.glb': Buffer.from('no model') });
+    const slow = await serve(folder, {}, { rate: 1_000_000 });
     try {
         const from_disk = pathToFileURL(join(resolve(folder), 'index.html')).href;
-        const wrong = await visit(browser, from_disk, { thorough: true, pictures, key_frames });
+        const wrong = await visit(browser, from_disk, { thorough: true, pictures, key_frames, title });
         if (key_frames) return wrong; // the rest is the same for all pages
         wrong.push(...await visit(browser, `${server.url}/index.html`, { thorough: false }));
         const { page } = await watched_page(browser, broken.url);
         await page.goto(`${broken.url}/index.html`);
         await on_page.ready(page);
         if (!/damaged/.test(await on_page.failure(page))) wrong.push('a damaged model is not told');
+        wrong.push(...await wait_for(browser, slow.url));
         return wrong;
     } finally {
         await browser.close();
         server.close();
         broken.close();
+        slow.close();
     }
 }
 
 if (process.argv[1] === fileURLToPath(import.meta.url)) {
-    const { positionals, values } = parseArgs({ allowPositionals: true, options: { pictures: { type: 'string' }, 'key-frames': { type: 'boolean' } } });
+    const { positionals, values } = parseArgs({ allowPositionals: true, options: { pictures: { type: 'string' }, 'key-frames': { type: 'boolean' }, title: { type: 'string' } } });
     if (positionals.length !== 1) fail('page.mjs: name the folder of the page');
-    const wrong = await check_page(positionals[0], values.pictures, values['key-frames']);
+    const wrong = await check_page(positionals[0], values.pictures, values['key-frames'], values.title);
     if (wrong.length > 0) fail(wrong.join('\n'));
 }

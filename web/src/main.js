@@ -30,7 +30,7 @@ class Page {
     this.set_dark(matchMedia('(prefers-color-scheme: dark)').matches);
     this.listen();
     element('buttons').hidden = element('panel').hidden = false;
-    element('panel').open = !is_narrow();
+    element('panel').open = new URLSearchParams(location.search).has('details');
     element('timeline').hidden = !model.action;
     this.resize();
     this.show_level(0);
@@ -104,8 +104,9 @@ class Page {
     const panel = element('panel'), timeline = element('timeline');
     const covered = panel.hidden || !panel.open ? 0 : panel.offsetWidth + 16;
     const bottom = timeline.hidden ? 0 : timeline.offsetHeight + 18;
-    if (is_narrow()) this.stage.resize(innerWidth, innerHeight, 0, bottom + panel.offsetHeight + 12);
-    else this.stage.resize(innerWidth, innerHeight, covered, bottom);
+    const top = document.querySelector('header').offsetHeight;
+    if (is_narrow()) this.stage.resize(innerWidth, innerHeight, 0, bottom + panel.offsetHeight + 12, top);
+    else this.stage.resize(innerWidth, innerHeight, covered, bottom, top);
     this.draw();
   }
 
@@ -325,12 +326,26 @@ function text_in(name, text) {
   return made;
 }
 
+/// What has come of the model, while there is only its poster to see.
+function tell_loaded(bytes) {
+  const all = Number(document.documentElement.dataset.bytes);
+  element('loading-text').textContent = `Loading the model: ${Math.min(Math.floor((100 * bytes) / all), 100)} % of ${size_text(all)}`;
+}
+
+function end_loading() {
+  element('loading')?.remove();
+  const poster = element('poster');
+  if (!poster) return;
+  poster.classList.add('gone');
+  setTimeout(() => poster.remove(), 400);
+}
+
 async function open() {
   try {
     const is_stream = document.documentElement.dataset.model === 'stream';
-    const model = is_stream ? await StreamModel.load() : await Model.load(await load_bytes());
+    const model = is_stream ? await StreamModel.load() : await Model.load(await load_bytes(tell_loaded));
     window.filigree = new Page(model);
-    element('loading').remove();
+    end_loading();
     if (is_stream) await window.filigree.receive();
   } catch (cause) {
     document.documentElement.dataset.theme = matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';
@@ -338,7 +353,7 @@ async function open() {
     element('failure-cause').textContent = /WebGL/.test(cause.message)
       ? 'This browser does not draw in three dimensions (WebGL 2); try another one, or allow it in the settings.'
       : cause.message;
-    element('loading')?.remove();
+    end_loading();
   }
 }
 

@@ -5,13 +5,20 @@ import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 
 const kFramingMoments = 32, kFramingVertices = 1500;
 
-/// The bytes of model.glb. A page that was opened from disk may not read other files, but may run scripts: there they
-/// come from model.glb.js.
-export async function load_bytes() {
+/// The bytes of model.glb. on_bytes: told how many there are, as they come. A page that was opened from disk may not
+/// read other files, but may run scripts: there they come from model.glb.js, all at once.
+export async function load_bytes(on_bytes) {
   if (location.protocol.startsWith('http')) {
     const response = await fetch('model.glb');
     if (!response.ok) throw new Error(`model.glb cannot be fetched: the server answers ${response.status}.`);
-    return response.arrayBuffer();
+    const pieces = [], reader = response.body.getReader();
+    for (let count = 0; ;) {
+      const { done, value } = await reader.read();
+      if (done) break;
+      pieces.push(value);
+      on_bytes(count += value.length);
+    }
+    return new Blob(pieces).arrayBuffer();
   }
   const parts = [];
   window.filigree_part = (text) => parts.push(Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)));
@@ -52,7 +59,7 @@ export class Model {
     });
     model.show_level(0);
     model.play(0);
-    model.box = model.animated_box();
+    model.frame_motion();
     return model;
   }
 
@@ -103,9 +110,10 @@ export class Model {
     return Array.from({ length: kFramingMoments + 1 }, (_, i) => (this.duration * i) / kFramingMoments);
   }
 
-  /// The box of all moments, from some of the vertices, with some room.
-  animated_box() {
+  /// `reached`, the places of some vertices in all moments; `box` holds them, with some room.
+  frame_motion() {
     const box = new THREE.Box3(), p = new THREE.Vector3();
+    this.reached = [];
     for (const moment of this.framing_moments()) {
       this.seek(moment);
       for (const mesh of this.levels[0].meshes) {
@@ -114,12 +122,12 @@ export class Model {
         for (let vertex = 0; vertex < count; vertex += step) {
           mesh.getVertexPosition(vertex, p);
           box.expandByPoint(p.applyMatrix4(mesh.matrixWorld));
+          this.reached.push(p.x, p.y, p.z);
         }
       }
     }
     this.seek(0);
-    const room = 0.004 * box.getSize(p).length();
-    return box.expandByScalar(room);
+    this.box = box.expandByScalar(0.004 * box.getSize(p).length());
   }
 }
 

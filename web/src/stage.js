@@ -14,6 +14,7 @@ export class Stage {
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     this.scene = new THREE.Scene();
 
+    this.model = model;
     this.box = model.box;
     this.centre = this.box.getCenter(new THREE.Vector3());
     this.radius = Math.max(this.box.getSize(new THREE.Vector3()).length() / 2, 1e-9);
@@ -98,41 +99,42 @@ export class Stage {
     this.sky.intensity = dark ? 1.1 : 1.6;
   }
 
-  /// right, bottom: pixels of the picture that something else covers; the model is put in the middle of the rest.
-  resize(width, height, right, bottom) {
+  /// right, bottom, top: pixels of the picture that something else covers; the model is put in the middle of the rest.
+  resize(width, height, right, bottom, top) {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
     this.height = height * this.renderer.getPixelRatio(); // pixels of the screen
     this.camera.aspect = width / height;
-    this.free = { width: width - right, height: height - bottom };
-    this.camera.setViewOffset(width, height, right / 2, bottom / 2, width, height);
+    this.free = { width: width - right, height: height - bottom - top };
+    this.camera.setViewOffset(width, height, right / 2, (bottom - top) / 2, width, height);
     if (!this.was_turned) this.frame(); // a view that the user chose stays
   }
 
-  /// All of the animation in the picture, seen from the front and a little from above.
+  /// All places of the animation in the picture, as large as can be, seen from the front and a little from above.
   frame() {
     this.was_turned = false;
     const { width, height } = this.free, full = this.renderer.getSize(new THREE.Vector2());
-    const tangent = Math.tan((kFieldOfView / 2) * (Math.PI / 180));
+    const tangent = (kFilled * Math.tan((kFieldOfView / 2) * (Math.PI / 180))) / full.y;
     const direction = new THREE.Vector3(0.45, 0.32, 1).normalize();
-    this.controls.target.copy(this.centre);
-    this.camera.position.copy(this.centre).addScaledVector(direction, 
-      this.distance(direction, (tangent * width) / full.y, (tangent * height) / full.y));
+    const right = new THREE.Vector3(0, 1, 0).cross(direction).normalize(), up = direction.clone().cross(right);
+    const across = this.fit(right, direction, tangent * width), upwards = this.fit(up, direction, tangent * height);
+    this.controls.target.copy(this.centre).addScaledVector(right, across.middle).addScaledVector(up, upwards.middle);
+    this.camera.position.copy(this.controls.target).addScaledVector(direction, Math.max(across.distance, upwards.distance));
     this.controls.update();
   }
 
-  /// How far away all corners of the box lie within the given tangents of the view's half angles.
-  distance(direction, across, upwards) {
-    const right = new THREE.Vector3(0, 1, 0).cross(direction).normalize(), up = direction.clone().cross(right);
-    const corner = new THREE.Vector3();
-    let distance = 0;
-    for (let i = 0; i < 8; ++i) {
-      corner.set(i & 1 ? this.box.max.x : this.box.min.x, i & 2 ? this.box.max.y : this.box.min.y,
-        i & 4 ? this.box.max.z : this.box.min.z).sub(this.centre);
-      const away = Math.max(Math.abs(corner.dot(right)) / across, Math.abs(corner.dot(up)) / upwards);
-      distance = Math.max(distance, corner.dot(direction) + away / kFilled);
+  /// Where along `axis` to look, and how far from the box's centre, so that all places lie within a tangent of the view's
+  /// half angle.
+  fit(axis, direction, tangent) {
+    const { reached } = this.model, p = new THREE.Vector3();
+    let low = -Infinity, high = -Infinity;
+    for (let i = 0; i < reached.length; i += 3) {
+      p.fromArray(reached, i).sub(this.centre);
+      const along = p.dot(direction), aside = p.dot(axis) / tangent;
+      low = Math.max(low, along - aside);
+      high = Math.max(high, along + aside);
     }
-    return distance;
+    return { middle: (tangent * (high - low)) / 2, distance: (low + high) / 2 };
   }
 
   /// Whether the view is still moving.

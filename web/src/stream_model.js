@@ -36,7 +36,7 @@ export class StreamModel {
     await model.begin();
     await model.next_level();
     model.show_level(0);
-    model.box = model.animated_box();
+    model.frame_motion();
     return model;
   }
 
@@ -224,15 +224,19 @@ export class StreamModel {
     return this.skeleton ? this.near_mesh.getVertexPosition(vertex, point) : point.fromBufferAttribute(position, vertex);
   }
 
-  /// The box of all moments, from the coarsest level's vertices, with some room.
-  animated_box() {
+  /// `reached`, the places of the coarsest level's vertices in all moments; `box` holds them, with some room.
+  frame_motion() {
+    this.reached = [];
     const box = new THREE.Box3(), p = new THREE.Vector3(), [{ meshes: [mesh] }] = this.levels;
     const moments = this.action ? kFramingMoments : 0, used = new Set(mesh.geometry.index.array);
     for (let i = 0; i <= moments; ++i) {
       this.seek((this.duration * i) / Math.max(moments, 1));
-      for (const vertex of used) box.expandByPoint(mesh.getVertexPosition(vertex, p));
+      for (const vertex of used) {
+        box.expandByPoint(mesh.getVertexPosition(vertex, p));
+        this.reached.push(p.x, p.y, p.z);
+      }
     }
     this.seek(0);
-    return box.expandByScalar(0.02 * box.getSize(p).length());
+    this.box = box.expandByScalar(0.02 * box.getSize(p).length());
   }
 }

@@ -169,6 +169,25 @@ std::string encode_png(const Picture& picture) {
     return bytes;
 }
 
+std::string encode_jpeg(const Picture& picture) {
+    if (picture.rgba.empty()) return {};
+    Picture opaque = picture;
+    for (std::size_t i = 0; i < opaque.rgba.size(); i += 4) {
+        const unsigned alpha = opaque.rgba[i + 3];
+        for (std::size_t k = 0; k < 3; ++k)
+            opaque.rgba[i + k] =
+                static_cast<std::uint8_t>((opaque.rgba[i + k] * alpha + 255 * (255 - alpha) + 127) / 255);
+    }
+    const std::unique_ptr<void, decltype(&tjDestroy)> encoder(tjInitCompress(), tjDestroy);
+    if (!encoder) throw std::bad_alloc();
+    unsigned char* at = nullptr;
+    unsigned long size = 0;
+    const int failed = tjCompress2(encoder.get(), opaque.rgba.data(), static_cast<int>(picture.width), 0,
+                                   static_cast<int>(picture.height), TJPF_RGBX, &at, &size, TJSAMP_444, 90, 0);
+    const std::unique_ptr<unsigned char, decltype(&tjFree)> guard(at, tjFree);
+    return failed ? std::string() : std::string(reinterpret_cast<const char*>(at), size);
+}
+
 double picture_distance(const Picture& a, const Picture& b) {
     if (a.width != b.width || a.height != b.height) return std::numeric_limits<double>::infinity();
     if (a.rgba.empty()) return 0;
