@@ -1,6 +1,7 @@
 #include "actions.h"
 
 #include "coloring.h"
+#include "export_sheet.h"
 #include "file_dialogs.h"
 #include "icons.h"
 #include "panels/panels.h"
@@ -10,6 +11,7 @@
 #include "words.h"
 
 #include "filigree/file.h"
+#include "filigree/physics/material.h"
 
 #include <QActionGroup>
 #include <QApplication>
@@ -168,6 +170,9 @@ struct Actions::Impl {
             {"file.export_film", "Export &film…",
              "Writes the recording as a film, seen as now (MP4, GIF or numbered PNGs)", "Ctrl+Shift+E",
              [this] { export_film(); }, has_recording, icon(Icon::film)},
+            {"file.export_animation", "Export a&nimation…",
+             "Writes the recording as GLB, PC2 or MDD, for other programs", "Ctrl+Shift+G",
+             [this] { export_animation(); }, has_recording, icon(Icon::animate)},
             {"file.export_meshes", "Export mes&hes…", "Writes a mesh for each frame of the recording", "",
              [this] { export_meshes(); }, has_recording, icon(Icon::meshes)},
             kSeparator,
@@ -277,6 +282,11 @@ struct Actions::Impl {
             view_switch("view.inside_points", "&Inside points", "Points inside the mesh at rest", "I",
                         &V::inside_points),
             view_switch("view.clip", "Clip pla&ne", "Cuts the mesh open", "C", &V::clip),
+            view_switch("view.follow", "Follow the m&otion", "The camera goes along with what moves, as in films", "O",
+                        &V::follow),
+            view_switch("view.blender_mouse", "Blender's mo&use",
+                        "The middle button turns the view, with Shift it moves it, with Ctrl it zooms", "",
+                        &V::blender_mouse),
             view_switch("view.ground", "&Ground", "The ground with the object's shadow", "G", &V::ground),
             kSeparator,
             view_switch("view.level_by_distance", "Level by &distance",
@@ -307,6 +317,8 @@ struct Actions::Impl {
                  window.show_panel("body");
              },
              has_model, icon(Icon::animate)},
+            {"body.wax", "Make it &wax", "Makes the body of wax, which melts, and drops it", "", [this] { make_wax(); },
+             has_model},
             kSeparator,
             {"body.play", "&Play", "Moves the body; makes it where there is none", "Space",
              [this] { workbench.play(); }, is_at_rest, icon(Icon::play)},
@@ -425,6 +437,19 @@ struct Actions::Impl {
                     });
     }
 
+    void export_animation() {
+        const auto ask = [this](const QString& extension) {
+            dialogs.ask(
+                {"file.export_animation",
+                 "Export the animation",
+                 {"Animations (*.glb *.pc2 *.mdd *.usda)", kAll},
+                 extension,
+                 proposal('.' + extension)},
+                [this](const QString& path) { window.write([&] { workbench.export_animation(path.toStdString()); }); });
+        };
+        make_export_sheet(workbench, ask, &window)->open();
+    }
+
     void export_meshes() {
         dialogs.ask(
             {"file.export_meshes", "Export a mesh for each frame", {kMeshes, kAll}, "obj", proposal("_%04d.obj")},
@@ -433,6 +458,17 @@ struct Actions::Impl {
                     window.write([&] { workbench.export_meshes(to); });
                 });
             });
+    }
+
+    void make_wax() {
+        const auto materials = named_materials();
+        const auto wax = std::ranges::find(materials, std::string_view("wax"), &NamedMaterial::name);
+        BodySettings body = workbench.state().body;
+        body.preset = "wax";
+        body.material = wax->material;
+        workbench.set_body(body);
+        workbench.animate();
+        window.show_panel("body");
     }
 
     void cancel() {

@@ -36,6 +36,7 @@ constexpr std::array kGestures = {
     Gesture{"Drag a knob", "deforms as the sliders do"},
     Gesture{"Drag beside it", "turns the view; so does a right drag"},
     Gesture{"Middle drag", "moves the view; so does Shift+drag"},
+    Gesture{"Middle drag, Blender's mouse", "turns it; Shift: moves, Ctrl: zooms"},
     Gesture{"Wheel", "zooms where the mouse is"},
     Gesture{"Double click", "looks at that point; beside: shows all"},
     Gesture{"Double click a slider", "its value at rest"},

@@ -3,6 +3,7 @@
 #include "icons.h"
 #include "theme.h"
 
+#include <QAction>
 #include <QBoxLayout>
 #include <QEvent>
 #include <QPainter>
@@ -16,11 +17,15 @@ constexpr int kInformationTime = 8000; // ms: long enough to read a path
 
 MessageBar::MessageBar(QWidget* parent)
     : QFrame(parent), icon_(new QLabel(this)), text_(new Text("message.text", Tone::plain, this)),
-      close_(new QToolButton(this)) {
+      offer_(new QPushButton(this)), close_(new QToolButton(this)) {
     setObjectName("message");
     icon_->setObjectName("message.icon");
     text_->setWordWrap(true);
     text_->setTextInteractionFlags(Qt::TextSelectableByMouse);
+    offer_->setObjectName("message.offer");
+    offer_->setFocusPolicy(Qt::TabFocus);
+    offer_->setAccessibleName("What the message offers");
+    offer_->setToolTip("What the message offers");
     close_->setObjectName("message.close");
     close_->setIcon(icon(Icon::close));
     close_->setAutoRaise(true);
@@ -32,6 +37,7 @@ MessageBar::MessageBar(QWidget* parent)
     row->setSpacing(8);
     row->addWidget(icon_, 0, Qt::AlignTop);
     row->addWidget(text_, 1);
+    row->addWidget(offer_, 0, Qt::AlignTop);
     row->addWidget(close_, 0, Qt::AlignTop);
     hide();
     parent->installEventFilter(this);
@@ -41,7 +47,18 @@ MessageBar::MessageBar(QWidget* parent)
     connect(close_, &QToolButton::clicked, this, &QWidget::hide);
 }
 
-void MessageBar::show_message(const QString& sentence, bool is_error) {
+void MessageBar::show_message(const QString& sentence, bool is_error, QAction* offer) {
+    disconnect(offered_);
+    offer_->setVisible(offer);
+    if (offer) {
+        offer_->setText(offer->text().remove('&').remove(QChar(0x2026)));
+        offer_->setToolTip(offer->toolTip());
+        offer_->setAccessibleName(offer_->text());
+        offered_ = connect(offer_, &QPushButton::clicked, this, [this, offer] {
+            hide();
+            offer->trigger();
+        });
+    }
     is_error_ = is_error;
     sentence_ = sentence;
     text_->setTextFormat(Qt::PlainText);
@@ -49,7 +66,7 @@ void MessageBar::show_message(const QString& sentence, bool is_error) {
     const int side = fontMetrics().height();
     icon_->setVisible(is_error);
     icon_->setPixmap(icon(Icon::warning).pixmap(QSize(side, side), devicePixelRatioF()));
-    is_error ? timer_.stop() : timer_.start();
+    is_error || offer ? timer_.stop() : timer_.start();
     setVisible(!sentence.isEmpty());
     raise();
     place();
@@ -63,7 +80,8 @@ void MessageBar::place() {
               width = std::min(parentWidget()->width() - 2 * margin, 50 * fontMetrics().averageCharWidth() + 300);
     const QMargins margins = layout()->contentsMargins();
     show_text(width - margins.left() - margins.right() - 2 * layout()->spacing() - close_->sizeHint().width() -
-              (icon_->isHidden() ? 0 : icon_->sizeHint().width()));
+              (icon_->isHidden() ? 0 : icon_->sizeHint().width()) -
+              (offer_->isHidden() ? 0 : offer_->sizeHint().width() + layout()->spacing()));
     const int height = std::max(layout()->totalHeightForWidth(width), layout()->totalMinimumSize().height());
     setGeometry((parentWidget()->width() - width) / 2, margin, width, height);
     if (isVisible()) Q_EMIT covers(margin + height);

@@ -8,13 +8,15 @@
 
 namespace filigree::studio {
 
-/// Lies over its parent, at the top. Errors stay until they are closed, information goes by itself.
+/// Lies over its parent, at the top. Errors, and what offers a button, stay until they are closed; information goes by
+/// itself.
 class MessageBar : public QFrame {
     Q_OBJECT
 public:
     explicit MessageBar(QWidget* parent);
 
-    void show_message(const QString& sentence, bool is_error);
+    /// offer: a button beside the sentence does it; null: none.
+    void show_message(const QString& sentence, bool is_error, QAction* offer = nullptr);
     QString message() const; ///< "" when it is hidden
 
 Q_SIGNALS:
@@ -32,6 +34,8 @@ private:
 
     QLabel* icon_;
     Text* text_;
+    QPushButton* offer_;
+    QMetaObject::Connection offered_;
     QToolButton* close_;
     QTimer timer_;
     QString sentence_;

@@ -1,6 +1,7 @@
 #include "picture_camera.h"
 
 #include "drawn_objects.h"
+#include "motion_cameras.h"
 
 #include <QStyle>
 
@@ -12,6 +13,8 @@ namespace filigree::studio {
 namespace {
 
 constexpr double kFlight = 0.25; // s on the way to another camera
+constexpr double kLatest = 1;    // s that are looked at while a body moves, as its future is not known
+constexpr double kLag = 0.15;    // s that the camera then stays behind
 
 /// Where a mesh is looked at from when it is opened: from the front, a little from the right and above.
 Vec3d first_direction(UpAxis up) {
@@ -29,6 +32,8 @@ PictureCamera::PictureCamera(Workbench& workbench, DrawnObjects& drawn, const QW
     connect(&timer_, &QTimer::timeout, this, &PictureCamera::fly_on);
     connect(&workbench.view(), &ViewState::changed, this, &PictureCamera::follow_view);
     connect(&workbench, &Workbench::opened, this, &PictureCamera::follow_opened);
+    connect(&workbench, &Workbench::pose_changed, this, &PictureCamera::follow_motion);
+    connect(&workbench.view(), &ViewState::changed, this, &PictureCamera::follow_motion);
     connect(&workbench, &Workbench::mode_changed, this, &PictureCamera::follow_body);
     connect(&workbench.playback(), &Playback::state_changed, this, &PictureCamera::follow_body);
 }
@@ -165,6 +170,56 @@ void PictureCamera::follow_body() {
     show(room, from.eye - from.target);
     if (distance(from) > distance(fitted_)) workbench_.view().set_zoom(distance(fitted_) / distance(from));
     fly_from(from);
+}
+
+/// Goes along with what moves. What the user does to the view meanwhile stays: direction, zoom and shift.
+void PictureCamera::follow_motion() {
+    const bool follows =
+        workbench_.view().settings().follow && workbench_.mode() == Mode::body && workbench_.frame_count() > 1;
+    if (!follows) {
+        followed_.reset();
+        zoom_ = 1;
+        aside_ = Vec3d::Zero();
+        return;
+    }
+    if (followed_ && distance(camera()) > 0) {
+        zoom_ *= distance(*followed_) / distance(camera());
+        aside_ += camera().target - followed_->target;
+    }
+    const Camera of_frame = camera_of_frame(std::min(workbench_.frame(), workbench_.frame_count() - 1));
+    Camera to = camera();
+    const Vec3d direction = (to.eye - to.target).normalized();
+    to.target = of_frame.target + aside_;
+    to.eye = to.target + distance(of_frame) / zoom_ * direction;
+    to.height = of_frame.height / zoom_;
+    stop_flight();
+    followed_ = to;
+    workbench_.view().set_camera(to);
+}
+
+Camera PictureCamera::camera_of_frame(std::size_t frame) {
+    const std::size_t count = workbench_.frame_count();
+    const Vec3d direction = (camera().eye - camera().target).normalized();
+    if (workbench_.playback().is_playing()) {
+        const auto latest = std::size_t(std::ceil(kLatest * workbench_.frames_per_second()));
+        const std::size_t first = frame + 1 > latest ? frame + 1 - latest : 0;
+        Camera now = motion_cameras(workbench_, first, frame + 1, camera(), tile_size().aspect()).back();
+        if (!followed_) return now;
+        const double share = 1 - std::exp(-1 / (kLag * workbench_.frames_per_second()));
+        const Vec3d before = followed_->target - aside_;
+        const double reach = zoom_ * distance(*followed_) + share * (distance(now) - zoom_ * distance(*followed_));
+        now.target = before + share * (now.target - before);
+        now.eye = now.target + reach * direction;
+        return now;
+    }
+    constexpr double kOther = 0.05; // of directions: distances would be others
+    const auto& recording = workbench_.state().recording;
+    if (track_.empty() || track_of_ != recording || (track_direction_ - direction).norm() > kOther) {
+        track_ = motion_cameras(workbench_, 0, count, camera(), tile_size().aspect());
+        track_of_ = recording;
+        track_direction_ = direction;
+    }
+    return track_[std::min(frame, track_.size() - 1)];
 }
 
 std::vector<QPointF> PictureCamera::places_of(std::span<const Index> some, std::span<const Vec3f> positions,

@@ -48,6 +48,8 @@ public:
 private:
     void follow_view();
     void follow_body();
+    void follow_motion();
+    Camera camera_of_frame(std::size_t frame);
     void fit(const Vec3d& direction, bool may_fly);
     void show(const Box& box, const Vec3d& direction);
     void fly_from(const Camera& from);
@@ -68,6 +70,14 @@ private:
     Camera fitted_;
     Box fitted_box_;
     std::string fitted_name_;
+
+    // Along with what moves:
+    std::optional<Camera> followed_; ///< as it was set last; none: it does not go along
+    double zoom_ = 1;                ///< of the user, over what all is seen from
+    Vec3d aside_ = Vec3d::Zero();    ///< that the user moved the view
+    std::vector<Camera> track_;      ///< of the whole recording
+    std::shared_ptr<const Recording> track_of_;
+    Vec3d track_direction_ = Vec3d::Zero();
 
     bool was_split_ = false;
     std::shared_ptr<const DroppedBody> framed_body_; ///< that the view was widened for

@@ -21,6 +21,12 @@ void shift_view(ViewState& view, const QPointF& moved, const PictureSize& size) 
     view.pan(-moved.x() / size.height, moved.y() / size.height);
 }
 
+/// Down and left: farther away.
+void zoom_view(ViewState& view, const QPointF& moved, const PictureSize&) {
+    constexpr double kAPixel = 1.005;
+    view.set_zoom(view.zoom() * std::pow(kAPixel, moved.x() - moved.y()));
+}
+
 } // namespace
 
 Pointer::Pointer(const ToolContext& context, QWidget& widget) : context_(context), widget_(widget) {
@@ -57,7 +63,9 @@ void Pointer::press(const QMouseEvent& event) {
     last_ = event.position();
     hover_timer_.stop();
     const bool is_left = event.button() == Qt::LeftButton;
-    if (event.button() == Qt::MiddleButton || (is_left && event.modifiers() & Qt::ShiftModifier))
+    if (event.button() == Qt::MiddleButton)
+        camera_drag_ = middle_drag(event.modifiers());
+    else if (is_left && event.modifiers() & Qt::ShiftModifier)
         camera_drag_ = shift_view;
     else if (event.button() == Qt::RightButton)
         camera_drag_ = turn_view;
@@ -65,6 +73,11 @@ void Pointer::press(const QMouseEvent& event) {
         press_left(event);
     show_cursor();
     Q_EMIT changed();
+}
+
+Pointer::CameraDrag Pointer::middle_drag(Qt::KeyboardModifiers keys) const {
+    if (!view().settings().blender_mouse || keys & Qt::ShiftModifier) return shift_view;
+    return keys & Qt::ControlModifier ? zoom_view : turn_view;
 }
 
 void Pointer::press_left(const QMouseEvent& event) {

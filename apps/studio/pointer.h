@@ -37,6 +37,7 @@ private:
     std::array<Tool*, 2> hand() const { return {knobs_.get(), tool_.get()}; } ///< first who is asked first
     void take_up();
     void press_left(const QMouseEvent& event);
+    CameraDrag middle_drag(Qt::KeyboardModifiers keys) const;
     void update_hover();
     void show_cursor();
     Qt::CursorShape cursor() const;

@@ -340,6 +340,7 @@ const std::map<QString, Script::Command>& Script::commands() {
         {"save_mesh", file_command(&Workbench::save_mesh)},
         {"save_driver", file_command(&Workbench::save_driver)},
         {"export_meshes", file_command(&Workbench::export_meshes)},
+        {"export_animation", file_command(&Workbench::export_animation)},
         {"export_film",
          {1, 1,
           [](Script& s, Words w) { return s.settle_well([&] { s.workbench().export_film(s.path(w[0]), {}); }); }}},

@@ -35,6 +35,8 @@ struct ViewSettings {
     bool keep_up = true;            ///< a coarser level while things move, where drawing is slow
     bool ground = true;
     UpAxis up = UpAxis::y;
+    bool follow = false;              ///< the camera goes along with what moves
+    bool blender_mouse = false;       ///< the middle button turns the view; the window remembers it
     bool gizmos = false;              ///< handles of the warps in the view; on while the Deform panel is shown
     double grip = 0.06, reach = 0.45; ///< of a pull, fractions of the mesh's diagonal
     double torch_size = Torch().size, torch_seconds = Torch().seconds;

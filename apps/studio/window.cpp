@@ -270,6 +270,10 @@ struct MainWindow::Impl {
         window.restoreGeometry(settings.value("window/geometry").toByteArray());
         splitter->restoreState(settings.value("window/splitter").toByteArray());
         window.show_panel(settings.value("window/panel", "model").toString());
+        workbench->view().edit([&](ViewSettings& view) {
+            view.blender_mouse = settings.value("view/blender_mouse", false).toBool();
+            view.follow = settings.value("view/follow", false).toBool();
+        });
         advanced_fold(window)->setChecked(settings.value("window/advanced", false).toBool());
     }
 
@@ -280,6 +284,8 @@ struct MainWindow::Impl {
         settings.setValue("window/panel", window.panel());
         settings.setValue("window/advanced", advanced_fold(window)->isChecked());
         settings.setValue("window/theme", int(theme));
+        settings.setValue("view/blender_mouse", workbench->view().settings().blender_mouse);
+        settings.setValue("view/follow", workbench->view().settings().follow);
     }
 };
 
@@ -430,8 +436,8 @@ void MainWindow::dropEvent(QDropEvent* event) {
 
 // Messages, theme, layout
 
-void MainWindow::show_message(const QString& sentence, bool is_error) {
-    impl_->messages->show_message(sentence, is_error);
+void MainWindow::show_message(const QString& sentence, bool is_error, const QString& action) {
+    impl_->messages->show_message(sentence, is_error, impl_->actions->find(action));
 }
 
 void MainWindow::dismiss_message() { impl_->messages->hide(); }

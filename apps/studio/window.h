@@ -38,7 +38,8 @@ public:
     void set_theme(Theme theme);
     void show_help(); ///< the sheet of shortcuts
 
-    void show_message(const QString& sentence, bool is_error); ///< in the window's message bar
+    /// In the window's message bar. action: the name of one that a button beside the sentence does; "": none.
+    void show_message(const QString& sentence, bool is_error, const QString& action = {});
     void dismiss_message();
     QString message() const; ///< what stands there; "" when it is hidden
 

@@ -34,6 +34,18 @@ QString rich_table(const std::vector<std::vector<QString>>& rows) {
     return text + "</table>";
 }
 
+QString size_text(std::uintmax_t bytes) {
+    if (bytes < 1000) return counted(std::size_t(bytes), "byte", "bytes");
+    double size = double(bytes);
+    const char* unit = "";
+    for (const char* const larger : {"kB", "MB", "GB"}) {
+        if (size < 1000) break;
+        size /= 1000;
+        unit = larger;
+    }
+    return number_text(size) + ' ' + unit;
+}
+
 QString file_name(const std::string& path) { return QString::fromStdString(path_of(path).filename().string()); }
 
 std::string about_file(const std::string& path, const std::string& sentence) {

@@ -4,6 +4,7 @@
 #include <QString>
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,8 @@ QString number_text(double value, int digits = 3); ///< significant digits, as s
 QString with_commas(std::size_t number);           ///< 12,345
 /// "1 vertex", "12,345 vertices".
 QString counted(std::size_t number, const QString& one, const QString& many);
+/// "512 bytes", "12.3 kB", "1.86 MB".
+QString size_text(std::uintmax_t bytes);
 /// The last part of a path.
 QString file_name(const std::string& path);
 /// The sentence, with the file in front unless it is named in it.

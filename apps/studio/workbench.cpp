@@ -204,14 +204,15 @@ void Workbench::measure_error() {
                            false);
     if (mode_ == Mode::body && (!is_live_frame() || playback_.moment()->full.empty())) {
         if (!is_live_frame())
-            return Q_EMIT told("The error of a recorded moment is only known while its body is there: press Play, then "
-                               "pause.",
-                               false);
+            return Q_EMIT told("The error of a recorded moment is only known while its body is there.", false,
+                               "body.play");
         impl_->measured_pose = impl_->pose_number;
         return ask_for_every_vertex();
     }
-    if (is_apart())
-        return Q_EMIT told("Pieces that are shown apart have no error: set Apart to 0 in the Fracture panel.", false);
+    if (is_apart()) { // only pieces that are together have an error
+        view_.edit([](ViewSettings& settings) { settings.apart = 0; });
+        Q_EMIT told("The pieces were moved together, to be measured.", false);
+    }
     const std::uint64_t number = impl_->pose_number;
     std::vector<Vec3f> full = mode_ == Mode::body ? playback_.moment()->full : full_;
     struct Measured {

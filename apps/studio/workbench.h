@@ -21,6 +21,16 @@ struct FilmSettings {
     unsigned width = 960, height = 720, passes = 8;
 };
 
+/// How a recording leaves as an animated GLB.
+struct GlbSettings {
+    double keys = 30;        ///< a second; 0: one a frame
+    bool compress = false;   ///< for viewers that know EXT_meshopt_compression
+    bool all_levels = false; ///< coarser levels too
+    bool six_joints = false; ///< a vertex: the true rest shape, for Blender
+    bool normals = true;
+    bool operator==(const GlbSettings&) const = default;
+};
+
 /// The files that stand where an export of so many pictures or meshes to "frame_%04d.obj" would write; of a path
 /// without a number the file itself, if it is there. For whoever asks before they are replaced.
 std::vector<std::string> existing_outputs(const std::string& pattern, std::size_t frames);
@@ -54,6 +64,10 @@ public:
     void save_driver(const std::string& path);      ///< as posed, with gradients
     void export_meshes(const std::string& pattern); ///< a mesh a frame of the recording, "frame_%04d.obj"
     void export_film(const std::string& path, const FilmSettings& settings); ///< of the recording, by the view's camera
+    /// The recording at the level shown: .glb, .pc2, .mdd or .usda. What is told has the size and the error.
+    void export_animation(const std::string& path);
+    const GlbSettings& glb_settings() const; ///< of the next export; no part of the document
+    void set_glb_settings(const GlbSettings& settings);
 
     // Model
     void make_shape(const Shape& shape, const std::string& merge = {});
@@ -116,6 +130,9 @@ public:
     std::size_t frame() const;       ///< shown, 0 .. frame_count() - 1
     double frames_per_second() const;
     void go_to_frame(std::size_t frame);
+    /// About what a recorded frame fills, in the world: the driver's box, and as much around it as the detail needs at
+    /// rest; of what melts its surface's. frame: below frame_count(). Cost O(driver).
+    Box motion_box(std::size_t frame) const;
 
     /// Measures what is shown against the full deformation, in the background; error_measured() tells.
     void measure_error();
@@ -149,10 +166,11 @@ Q_SIGNALS:
     void inside_points_ready();
     void quad_options_changed();
     void piece_options_changed();
-    void opened();                                     ///< another mesh or model than before
-    void saved(const std::string& path);               ///< by save_model
-    void told(const QString& sentence, bool is_error); ///< for the window's message bar
-    void withdrawn(const QString& sentence);           ///< what was told is not so any more
+    void opened();                       ///< another mesh or model than before
+    void saved(const std::string& path); ///< by save_model
+    /// For the window's message bar. action: the name of one that settles it with a click; "": none.
+    void told(const QString& sentence, bool is_error, const QString& action = {});
+    void withdrawn(const QString& sentence); ///< what was told is not so any more
 
 private:
     struct Impl;

@@ -18,7 +18,7 @@ QString warning_of(const DroppedBody& made) {
     QString text = QString::fromStdString(made.report.warning);
     if (!made.coarse_driver) return text;
     if (!text.isEmpty()) text += ' ';
-    return text + QString::fromStdString(made.coarse_driver->sentence()) + ". Fit driver makes such a driver.";
+    return text + QString::fromStdString(made.coarse_driver->sentence()) + ".";
 }
 
 } // namespace
@@ -72,9 +72,8 @@ void Workbench::hold_torch(const Vec3d& at, bool cools) {
     const bool is_there = mode_ == Mode::body && made && filigree::can_melt(*made);
     if (!is_there) {
         if (!std::exchange(impl_->told_of_torch, true))
-            Q_EMIT told("The torch is for a body that melts: choose wax, chocolate, butter, ice or lava in the Body "
-                        "panel, and press Animate.",
-                        false);
+            Q_EMIT told("The torch is for a body that melts, such as one of wax, chocolate, butter, ice or lava.",
+                        false, "body.wax");
         return;
     }
     impl_->replay.stop();
@@ -147,7 +146,7 @@ void Workbench::put_body(std::shared_ptr<const DroppedBody> made) {
     set_mode(Mode::body);
     show_pose();
     Q_EMIT timeline_changed();
-    if (!body_warning().isEmpty()) Q_EMIT told(body_warning(), false);
+    if (!body_warning().isEmpty()) Q_EMIT told(body_warning(), false, made->coarse_driver ? "body.fit_driver" : "");
     const bool is_deformed = !state().warps.none() || state().handle_pose;
     if (is_deformed && !std::exchange(impl_->told_of_rest, true))
         Q_EMIT told("A body is made of the shape at rest, without its deformation.", false);
@@ -269,6 +268,21 @@ void Workbench::go_to_frame(std::size_t frame) {
     else
         set_mode(Mode::body);
     Q_EMIT timeline_changed();
+}
+
+Box Workbench::motion_box(std::size_t frame) const {
+    const Vec3d origin = state().model->mesh.origin;
+    const auto surface = playback_.has_body() ? playback_.surface(frame) : state().recording->surface(frame);
+    Box box = bounds(surface ? surface->positions : recorded_pose(frame).positions);
+    if (!surface) {
+        const Box rest = bounds(state().model->mesh.positions), driver = bounds(driver_positions(*state().model));
+        const double margin = std::max((driver.min - rest.min).maxCoeff(), (rest.max - driver.max).maxCoeff());
+        box.min -= Vec3d::Constant(std::max(margin, 0.0));
+        box.max += Vec3d::Constant(std::max(margin, 0.0));
+    }
+    box.min += origin;
+    box.max += origin;
+    return box;
 }
 
 void Workbench::show_last_frame() {

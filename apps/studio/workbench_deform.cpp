@@ -46,7 +46,7 @@ void Workbench::pin(std::span<const Index> driver_vertices) {
     const std::size_t count = studio::pin(next.handles, driver_vertices, places);
     if (count == 0) return;
     document_.change("Pin " + counted(count, "vertex", "vertices"), std::move(next));
-    if (playback_.has_body()) Q_EMIT told("Make the body again for new pins to hold it.", false);
+    if (playback_.has_body()) Q_EMIT told("New pins hold the body once it is made again.", false, "body.make");
 }
 
 void Workbench::unpin(std::span<const Index> driver_vertices) {
@@ -54,7 +54,7 @@ void Workbench::unpin(std::span<const Index> driver_vertices) {
     const std::size_t count = studio::unpin(next.handles, driver_vertices, next.model->driver().vertices.size());
     if (count == 0) return;
     document_.change("Unpin " + counted(count, "vertex", "vertices"), std::move(next));
-    if (playback_.has_body()) Q_EMIT told("Make the body again for it to be free there.", false);
+    if (playback_.has_body()) Q_EMIT told("The body is free there once it is made again.", false, "body.make");
 }
 
 void Workbench::unpin_all() { unpin(pinned_vertices(state().handles)); }
@@ -65,21 +65,20 @@ void Workbench::begin_pull(Index vertex, const Vec3d& at) {
     if (vertex >= mesh.vertex_count() || !at.allFinite()) return;
     const Vec3f rest = mesh.positions[vertex];
     if (mode_ == Mode::body) {
-        if (!playback_.has_body()) return Q_EMIT told("A recording cannot be pulled: make the body first.", false);
+        if (!playback_.has_body())
+            return Q_EMIT told("A recording cannot be pulled, but its body can.", false, "body.make");
         impl_->replay.stop();
         show_last_frame();
         return playback_.grab(rest, at - mesh.origin);
     }
     if (state().source->pieces)
-        return Q_EMIT told("What is in pieces is pulled as a body: make one (the Body panel), then pull it until it "
-                           "breaks.",
-                           false);
+        return Q_EMIT told("What is in pieces is pulled as a body, until it breaks.", false, "body.make");
     const double diagonal = bounds(mesh).diagonal();
     Handle pull{.centre = rest,
                 .grip = view_.settings().grip * diagonal,
                 .reach = std::max(view_.settings().reach, view_.settings().grip) * diagonal};
     PullRegion region = pull_region(state(), rest, pull.grip, pull.reach, vertex);
-    if (region.grip.empty()) return Q_EMIT told("Everything here is pinned: unpin something to pull it.", false);
+    if (region.grip.empty()) return Q_EMIT told("Everything here is pinned.", false, "edit.unpin_all");
     pull.vertices = std::move(region.grip);
     pull.held = std::move(region.held);
     impl_->warp = make_warp(state().warps, world_bounds(mesh));

@@ -1,6 +1,7 @@
 // Files in and out.
 #include "workbench_impl.h"
 
+#include "motion_cameras.h"
 #include "pins.h"
 #include "words.h"
 
@@ -156,6 +157,15 @@ Result<QString> write_told(const Mesh& mesh, const std::string& path, const RunC
     return text;
 }
 
+/// Of a file that was written. Numbered files: of all, the folder alone.
+QString size_and_folder(const std::string& path) {
+    std::error_code none;
+    const fs::path whole = fs::absolute(path_of(path), none);
+    const std::uintmax_t bytes = fs::file_size(whole, none);
+    const QString folder = QString::fromStdString(whole.parent_path().string());
+    return none ? QString(" Folder: %1.").arg(folder) : QString(" %1, in %2.").arg(size_text(bytes), folder);
+}
+
 /// All or none.
 Result<QString> write_frames(const State& state, const Recording& poses, const NumberedName& name,
                              const RunContext& context) {
@@ -225,7 +235,7 @@ void Workbench::open_whole(const std::string& path, std::shared_ptr<const Source
             const bool is_warped_look = look && now.source == look && now.handles.empty() && !now.recording;
             if (document_.state_id() != id && !is_warped_look)
                 return Q_EMIT told("The document was changed while " + file_name(path) + " was read; open it again.",
-                                   true);
+                                   true, "file.open");
             if (is_warped_look) state.warps = now.warps;
             const QString text = summary(state);
             const bool has_motion = state.recording != nullptr;
@@ -256,9 +266,9 @@ void Workbench::save(const QString& title, const std::string& path,
             if (!text) return about(path, text.error());
             return text;
         },
-        [this, then = std::move(then)](const QString& text) {
+        [this, path, then = std::move(then)](const QString& text) {
             if (then) then();
-            Q_EMIT told(text, false);
+            Q_EMIT told(text + size_and_folder(path), false);
         });
 }
 
@@ -317,7 +327,7 @@ void Workbench::export_meshes(const std::string& pattern) {
                                                              "in frame_%04d.obj.",
                            true);
     commit_recording();
-    if (!state().recording) return Q_EMIT told("There is nothing recorded yet: press Play first.", true);
+    if (!state().recording) return Q_EMIT told("There is nothing recorded yet.", true, "body.play");
     save("Exporting meshes", pattern, [state = state(), name = *name](const RunContext& context) {
         return write_frames(state, *state.recording, name, context);
     });
@@ -337,6 +347,9 @@ void Workbench::export_film(const std::string& path, const FilmSettings& setting
     if (state().recording) film->surfaces = state().recording->surfaces;
     if (playback_.has_body()) film->surroundings = playback_.made()->surroundings;
     film->camera = view_.camera();
+    if (view.follow && frame_count() > 1)
+        film->cameras =
+            motion_cameras(*this, 0, frame_count(), view_.camera(), double(settings.width) / settings.height);
     film->up = view.up;
     film->ground = view.ground;
     film->width = settings.width;

@@ -33,6 +33,7 @@ struct Workbench::Impl {
 
     QuadRemeshOptions quad_options;
     PieceOptions piece_options;
+    GlbSettings glb_settings;
     double shown_apart = 0; ///< how far pieces are apart in the pose shown
 
     QTimer replay;

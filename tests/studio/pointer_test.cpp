@@ -107,6 +107,31 @@ TEST(Pointer, WhatIsGrabbedStaysUnderThePointer) {
     check("bent cube");
 }
 
+TEST(Pointer, TheMiddleButtonIsBlendersWhereThatIsChosen) {
+    Stand stand;
+    ASSERT_TRUE(stand.is_ready());
+    const QPoint from = stand.middle(), to = from + QPoint(40, 0);
+    const auto camera = [&] { return stand.workbench.view().camera(); };
+    const Camera first = camera();
+    stand.drag(from, to, Qt::MiddleButton);
+    EXPECT_GT((camera().target - first.target).norm(), 0.05) << "moves";
+
+    stand.workbench.view().set_camera(first);
+    stand.set([](ViewSettings& s) { s.blender_mouse = true; });
+    stand.drag(from, to, Qt::MiddleButton);
+    EXPECT_EQ(camera().target, first.target);
+    EXPECT_GT((camera().eye - first.eye).norm(), 0.1 * (first.eye - first.target).norm()) << "turns";
+
+    stand.workbench.view().set_camera(first);
+    stand.drag(from, to, Qt::MiddleButton, Qt::ShiftModifier);
+    EXPECT_GT((camera().target - first.target).norm(), 0.05) << "moves";
+
+    stand.workbench.view().set_camera(first);
+    stand.drag(from, to, Qt::MiddleButton, Qt::ControlModifier);
+    EXPECT_EQ(camera().target, first.target);
+    EXPECT_LT((camera().eye - first.target).norm(), 0.95 * (first.eye - first.target).norm()) << "comes closer";
+}
+
 TEST(Pointer, EscapePutsBack) {
     Stand stand;
     ASSERT_TRUE(stand.is_ready());

@@ -289,6 +289,43 @@ TEST_F(Window, AMessageThatIsNotSoAnyMoreGoes) {
     EXPECT_EQ(window->message(), "");
 }
 
+TEST_F(Window, AMessageCanOfferAButton) {
+    auto& offer = *window->findChild<QPushButton*>("message.offer");
+    window->show_message("Everything here is pinned.", false, "edit.unpin_all");
+    EXPECT_FALSE(offer.isHidden());
+    EXPECT_EQ(offer.text(), "Unpin all");
+    workbench().pin(std::vector<Index>{1, 2});
+    offer.click();
+    EXPECT_TRUE(workbench().state().handles.empty());
+    EXPECT_EQ(window->message(), "");
+    workbench().pin(std::vector<Index>{1, 2});
+    window->show_message("Something else.", false);
+    EXPECT_TRUE(offer.isHidden());
+    offer.click(); // what was offered before is gone
+    EXPECT_FALSE(workbench().state().handles.empty());
+}
+
+TEST_F(Window, TheExportSheetAsksForWhatMatters) {
+    make_body_and_steps(workbench());
+    workbench().playback().wait_for_frames(0);
+    window->actions().find("file.export_animation")->trigger();
+    auto* sheet = window->findChild<QDialog*>("export.sheet");
+    ASSERT_TRUE(sheet);
+    auto* keys = sheet->findChild<QComboBox*>("export.keys");
+    EXPECT_EQ(keys->currentText(), "30 a second");
+    keys->setCurrentIndex(0);
+    sheet->findChild<QCheckBox*>("export.compress")->click();
+    EXPECT_EQ(workbench().glb_settings(), (GlbSettings{.keys = 0, .compress = true}));
+    sheet->findChild<QComboBox*>("export.format")->setCurrentIndex(1);
+    EXPECT_TRUE(keys->isHidden());
+    sheet->findChild<QPushButton*>("export.go_on")->click();
+    auto* dialog = window->findChild<QFileDialog*>("file.export_animation.dialog");
+    ASSERT_TRUE(dialog);
+    EXPECT_EQ(dialog->defaultSuffix(), "pc2");
+    dialog->reject();
+    workbench().set_glb_settings({});
+}
+
 TEST_F(Window, LongNamesAreShortened) {
     const QString name = QString("a_very_long_name_").repeated(12);
     window->open_file(triangle((name + ".obj").toStdString().c_str()));

@@ -121,9 +121,10 @@ TEST_F(WorkbenchTest, ADriverTooCoarseForTheBodyIsToldAndFitted) {
     bench.make_body();
     bench.wait_until_idle();
     const std::string warning = bench.body_warning().toStdString();
-    EXPECT_NE(warning.find("Fit driver"), std::string::npos) << warning;
+    EXPECT_NE(warning.find("a driver of about"), std::string::npos) << warning;
     EXPECT_EQ(warning.find("max_edge"), std::string::npos) << "that is for the command line: " << warning;
     EXPECT_EQ(notes, std::vector{warning});
+    EXPECT_EQ(offers.back(), "body.fit_driver");
 
     QSignalSpy withdrawn(&bench, &Workbench::withdrawn);
     bench.fit_driver();
@@ -253,7 +254,8 @@ TEST_F(WorkbenchTest, WhatABodyDoesNotTakeIsTold) {
     EXPECT_EQ(notes[1], "A body is made of the shape at rest, without its deformation.");
     bench.pin(std::vector<Index>{3});
     ASSERT_EQ(notes.size(), 3u);
-    EXPECT_EQ(notes[2], "Make the body again for new pins to hold it.");
+    EXPECT_EQ(notes[2], "New pins hold the body once it is made again.");
+    EXPECT_EQ(offers, (std::vector<std::string>{"body.fit_driver", "", "body.make"}));
 }
 
 } // namespace

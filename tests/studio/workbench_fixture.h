@@ -17,9 +17,11 @@ namespace filigree::studio {
 class WorkbenchTest : public testing::Test {
 protected:
     WorkbenchTest() {
-        QObject::connect(&bench, &Workbench::told, &bench, [this](const QString& sentence, bool is_error) {
-            (is_error ? errors : notes).push_back(sentence.toStdString());
-        });
+        QObject::connect(&bench, &Workbench::told, &bench,
+                         [this](const QString& sentence, bool is_error, const QString& action) {
+                             (is_error ? errors : notes).push_back(sentence.toStdString());
+                             offers.push_back(action.toStdString());
+                         });
         QObject::connect(&bench, &Workbench::opened, &bench, [this] { ++opened; });
     }
 
@@ -60,7 +62,7 @@ protected:
     }
 
     Workbench bench{first_state_once()};
-    std::vector<std::string> errors, notes;
+    std::vector<std::string> errors, notes, offers; ///< an offer comes with each of the others
     int opened = 0;
     QTemporaryDir folder;
 };

@@ -67,6 +67,14 @@ public:
             rows,
             view.setting("view.up", "Up", "The axis that points up; gravity pulls the other way", field(&Settings::up)),
             {"x", "y", "z"});
+        check(rows, view.setting("view.follow", "Follow the motion",
+                                 "The camera goes along with what moves, as in films", field(&Settings::follow)));
+        choice(rows,
+               view.setting("view.mouse", "Mouse",
+                            "Filigree's: the middle button moves the view. Blender's: it turns it, with Shift it moves "
+                            "it, with Ctrl it zooms.",
+                            field(&Settings::blender_mouse)),
+               {"Filigree's", "Blender's"});
         choice(rows,
                {"view.theme", "Theme", "The colours of the window", [&window] { return double(window.theme()); },
                 [&window](double index) { window.set_theme(static_cast<Theme>(int(index))); }},

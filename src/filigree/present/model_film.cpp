@@ -84,6 +84,10 @@ Result<std::size_t> film_model(const ModelFilm& film, const std::string& path, c
     std::optional<Drawable> melt;
     Camera camera = film.camera;
     camera.up = up_vector(film.up);
+    const auto seen_from = [&](std::size_t frame) {
+        if (turns) return turned(camera, 360.0 * double(frame) / double(frames));
+        return film.cameras.empty() ? camera : film.cameras[std::min(frame, film.cameras.size() - 1)];
+    };
     const auto draw = [&](std::size_t frame, const RunContext&) -> Result<Picture> {
         scene.objects[0].drawable = &*model;
         if (!turns && frame < film.surfaces.size() && film.surfaces[frame]) {
@@ -97,7 +101,7 @@ Result<std::size_t> film_model(const ModelFilm& film, const std::string& path, c
         } else if (!turns) {
             if (const Status posed = model->set_pose(film.poses.frames[frame], quiet); !posed) return posed.error();
         }
-        return renderer->picture(scene, turns ? turned(camera, 360.0 * double(frame) / double(frames)) : camera,
+        return renderer->picture(scene, seen_from(frame),
                                  {.width = film.width, .height = film.height, .passes = film.passes}, quiet);
     };
     if (const Status drawn = film_frames(frames, draw, std::span(&*writer, 1), "drawing the film", context); !drawn)

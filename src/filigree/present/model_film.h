@@ -24,6 +24,7 @@ struct ModelFilm {
     std::vector<std::shared_ptr<const Mesh>> surfaces = {};
     std::optional<Surroundings> surroundings; ///< drawn, and their ground; unset: the ground is below all
     Camera camera;                            ///< its `up` is taken from below
+    std::vector<Camera> cameras = {};         ///< of poses: one a frame, the last one also beyond; empty: `camera`
     UpAxis up = UpAxis::y;
     bool ground = true; ///< where surroundings do not say
     unsigned width = 960, height = 720, passes = 8;
