@@ -4,6 +4,7 @@
 #include "export_sheet.h"
 #include "file_dialogs.h"
 #include "icons.h"
+#include "motion_file.h"
 #include "panels/panels.h"
 #include "pins.h"
 #include "tools/tool.h"
@@ -38,7 +39,8 @@ QString mesh_patterns(bool for_reading) {
 }
 
 const QString kMeshes = "Meshes (" + mesh_patterns(false).trimmed() + ')';
-const QString kOpenable = "Meshes and models (*.fil" + mesh_patterns(true) + ')';
+const QString kOpenable = "Meshes, models and animations (*.fil *.pc2 *.mdd" + mesh_patterns(true) + ')';
+const QString kMoving = "Animations (*.pc2 *.mdd" + mesh_patterns(true) + ')';
 
 /// A row of a menu.
 struct Command {
@@ -175,6 +177,26 @@ struct Actions::Impl {
              [this] { export_animation(); }, has_recording, icon(Icon::animate)},
             {"file.export_meshes", "Export mes&hes…", "Writes a mesh for each frame of the recording", "",
              [this] { export_meshes(); }, has_recording, icon(Icon::meshes)},
+            kSeparator,
+            {"fit.open",
+             "Open ani&mation…",
+             "Opens an animated glTF, one of numbered meshes, or a point cache (.pc2, .mdd) of the mesh that is open",
+             "Ctrl+Shift+O",
+             [this] { open_motion(); },
+             {},
+             icon(Icon::open)},
+            {"fit.make", "Fi&t", "Finds the smallest driver that follows the animation, in the background", "Ctrl+F",
+             [this] {
+                 window.show_panel("fit");
+                 workbench.fit();
+             },
+             [this] { return workbench.can_fit(); }},
+            {"fit.save_packed", "Save pac&ked…", "Saves the fitted model in few bytes", "",
+             [this] {
+                 save_to({"fit.save_packed", "Save the fitted model", {kModels, kAll}, "fil", proposal("_fitted.fil")},
+                         &Workbench::save_packed);
+             },
+             [this] { return workbench.can_fit() && workbench.state().recording->fitted; }, icon(Icon::save)},
             kSeparator,
             {"file.quit", "&Quit", "Leaves; asks about unsaved changes first", "Ctrl+Q", [this] { window.close(); }},
         };
@@ -405,6 +427,15 @@ struct Actions::Impl {
     void open() {
         dialogs.ask({"file.open", "Open a mesh or a model", {kOpenable, kAll}},
                     [this](const QString& path) { window.open_file(path); });
+    }
+
+    void open_motion() {
+        dialogs.ask({"fit.open", "Open an animation", {kMoving, kAll}}, [this](const QString& path) {
+            const bool replaces = !is_point_cache(path.toStdString()); // a cache moves what is there
+            if (replaces && !window.may_discard()) return;
+            window.show_panel("fit");
+            workbench.open_motion(path.toStdString());
+        });
     }
 
     void save_as() {

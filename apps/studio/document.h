@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/deform/warp_steps.h"
+#include "filigree/fit.h"
 #include "filigree/mesh.h"
 #include "filigree/render/surface_materials.h"
 #include "filigree/restore.h"
@@ -25,9 +26,10 @@ struct MadePieces;
 /// A mesh as it came and what is known of it. Never changes once made.
 struct Source {
     Mesh mesh;
-    std::string path; ///< "" for a built-in shape
-    std::string name; ///< what the window calls it
-    Box box;          ///< of the mesh, in the world
+    std::string path;     ///< "" for a built-in shape
+    std::string name;     ///< what the window calls it
+    Box box;              ///< of the mesh, in the world
+    std::string contents; ///< what else its file holds: "a skin of 24 joints"; "": nothing
     std::vector<std::string> warnings;
     TopologyReport topology;
     SurfaceMaterials materials;
@@ -71,6 +73,22 @@ struct BodySettings : DropOptions {
 /// Whether the body of one is that of the other: what may change around it while it moves is not compared.
 bool is_same_body(BodySettings a, const BodySettings& b);
 
+/// An animation of another program: what poses are to follow. Shared, and never changes.
+struct MovingMesh {
+    std::string path;
+    std::vector<std::string> clips; ///< of a glTF, as they are shown
+    std::size_t clip = 0;           ///< that the frames are of
+    double frames_per_second = 60;
+    std::vector<std::vector<Vec3f>> frames; ///< positions relative to the origin, one a vertex of the source's mesh
+};
+
+/// What a fit came to. Shared, and never changes.
+struct FittedMotion {
+    FitReport report;
+    std::string packed;                    ///< the bytes of a compact model file
+    double packed_rms = 0, packed_max = 0; ///< the error of that file, fractions of the diagonal
+};
+
 /// What a body did, for the driver. Frames are shared between the steps of the history, so a longer recording costs its
 /// new frames alone.
 struct Recording {
@@ -79,7 +97,11 @@ struct Recording {
     /// One a frame, of a body that melts: what there is in place of the restored mesh; null: nothing. Beyond the end:
     /// null.
     std::vector<std::shared_ptr<const Mesh>> surfaces;
+    /// What the poses follow; null: nothing. As many frames.
+    std::shared_ptr<const MovingMesh> original;
+    std::shared_ptr<const FittedMotion> fitted; ///< how well they do; null, with an original: they do not yet, all rest
 
+    bool has_poses() const { return !original || fitted; }
     std::shared_ptr<const Mesh> surface(std::size_t frame) const {
         return frame < surfaces.size() ? surfaces[frame] : nullptr;
     }

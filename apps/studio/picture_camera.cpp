@@ -130,6 +130,16 @@ void PictureCamera::follow_opened() {
 Box PictureCamera::opened_box() const {
     const State& state = workbench_.state();
     Box box = state.source->box;
+    if (state.recording && state.recording->original) { // some frames tell where it goes
+        constexpr std::size_t kSome = 16;
+        const std::size_t count = state.recording->frames.size(), step = std::max<std::size_t>(1, count / kSome);
+        for (std::size_t frame = 0; frame < count; frame += step) {
+            const Box there = workbench_.motion_box(frame);
+            box.extend(there.min);
+            box.extend(there.max);
+        }
+        return box;
+    }
     const Pose* pose = workbench_.pose();
     if (!pose || !state.model || pose->positions.size() != state.model->driver().vertices.size()) return box;
     const Vec3d origin = state.source->mesh.origin;

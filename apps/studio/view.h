@@ -35,6 +35,7 @@ struct ViewSettings {
     bool keep_up = true;            ///< a coarser level while things move, where drawing is slow
     bool ground = true;
     UpAxis up = UpAxis::y;
+    bool original = false;            ///< the animation that a driver was fitted to, in place of the restored mesh
     bool follow = false;              ///< the camera goes along with what moves
     bool blender_mouse = false;       ///< the middle button turns the view; the window remembers it
     bool gizmos = false;              ///< handles of the warps in the view; on while the Deform panel is shown

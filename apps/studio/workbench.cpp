@@ -68,8 +68,9 @@ Workbench::Workbench(State start) : impl_(std::make_unique<Impl>()) {
         tell(error);
     });
     connect(&view_, &ViewState::changed, this, [this] {
-        if (mode_ == Mode::deform && impl_->shown_apart != view_.settings().apart && state().source->pieces)
-            show_pose();
+        const bool is_apart_anew =
+            mode_ == Mode::deform && impl_->shown_apart != view_.settings().apart && state().source->pieces;
+        if (is_apart_anew || std::exchange(impl_->shown_original, shows_original()) != shows_original()) show_pose();
     });
     connect(&impl_->replay, &QTimer::timeout, this, &Workbench::replay_frame);
     document_.replace(std::move(start));
@@ -154,7 +155,10 @@ void Workbench::forget_measuring() {
 
 void Workbench::find_full() {
     if (mode_ == Mode::body) {
-        if (is_live_frame()) full_ = playback_.moment()->full;
+        if (is_live_frame())
+            full_ = playback_.moment()->full;
+        else if (is_compared_with_original())
+            full_ = state().recording->original->frames[frame_];
         return full_is_new();
     }
     if (is_pulling() || is_apart() || state().pose_from_file ||
@@ -198,11 +202,16 @@ bool Workbench::is_to_measure() const {
 }
 
 void Workbench::measure_error() {
+    if (shows_original()) {
+        if (!state().recording->fitted)
+            return Q_EMIT told("This is the animation itself, which has no error.", false, "fit.make");
+        view_.edit([](ViewSettings& settings) { settings.original = false; });
+    }
     if (melt_surface())
         return Q_EMIT told("What has melted has no error: its surface is made of the particles. filigree simulate "
                            "--check measures the parts that are left.",
                            false);
-    if (mode_ == Mode::body && (!is_live_frame() || playback_.moment()->full.empty())) {
+    if (mode_ == Mode::body && !is_compared_with_original() && (!is_live_frame() || playback_.moment()->full.empty())) {
         if (!is_live_frame())
             return Q_EMIT told("The error of a recorded moment is only known while its body is there.", false,
                                "body.play");
@@ -214,7 +223,9 @@ void Workbench::measure_error() {
         Q_EMIT told("The pieces were moved together, to be measured.", false);
     }
     const std::uint64_t number = impl_->pose_number;
-    std::vector<Vec3f> full = mode_ == Mode::body ? playback_.moment()->full : full_;
+    std::vector<Vec3f> full = mode_ == Mode::deform         ? full_
+                              : is_compared_with_original() ? state().recording->original->frames[frame_]
+                                                            : playback_.moment()->full;
     struct Measured {
         VertexDistance distance;
         std::vector<Vec3f> full;

@@ -31,6 +31,13 @@ struct GlbSettings {
     bool operator==(const GlbSettings&) const = default;
 };
 
+/// How a driver is fitted to an animation.
+struct FitSettings {
+    double error = 1e-4;           ///< rms, fraction of the diagonal, also of the packed file
+    double frames_per_second = 30; ///< of files that do not say one
+    bool operator==(const FitSettings&) const = default;
+};
+
 /// The files that stand where an export of so many pictures or meshes to "frame_%04d.obj" would write; of a path
 /// without a number the file itself, if it is there. For whoever asks before they are replaced.
 std::vector<std::string> existing_outputs(const std::string& pattern, std::size_t frames);
@@ -82,6 +89,15 @@ public:
     void set_piece_options(const PieceOptions& options);
     void cut_pieces(); ///< the mesh becomes pieces, in the background; again: of the whole mesh
     void make_whole(); ///< the mesh before it was cut
+    // Animations of other programs
+    const FitSettings& fit_settings() const; ///< of the next fit; no part of the document
+    void set_fit_settings(const FitSettings& settings);
+    /// An animated glTF becomes the document, at a clip; so do numbered meshes, of which one is named. The frames of a
+    /// .pc2 or .mdd move the mesh there is.
+    void open_motion(const std::string& path, std::size_t clip = 0);
+    void fit(); ///< a driver and poses that follow the animation, in the background
+    bool can_fit() const { return state().recording && state().recording->original; }
+    void save_packed(const std::string& path); ///< the fitted model, in few bytes
     // Detail
     void set_strip(const StripOptions& options, const std::string& merge = {}); ///< strips again
     const StripOptions& wanted_strip() const;                                   ///< as being stripped, else as it is
@@ -124,6 +140,7 @@ public:
     bool can_melt() const; ///< the material of the body, or of the one to be made
     /// What is shown in place of the restored mesh: of a body that melts; null: nothing.
     std::shared_ptr<const Mesh> melt_surface() const;
+    bool shows_original() const;         ///< that is the animation as it was opened
     void want_temperatures(bool wanted); ///< as the playback's moment tells them
     // Timeline
     std::size_t frame_count() const; ///< recorded frames, the start included; 0: none
@@ -165,6 +182,7 @@ Q_SIGNALS:
     void error_measured();
     void inside_points_ready();
     void quad_options_changed();
+    void fit_settings_changed();
     void piece_options_changed();
     void opened();                       ///< another mesh or model than before
     void saved(const std::string& path); ///< by save_model
@@ -203,9 +221,12 @@ private:
     bool is_refused(const std::string& topic, const QString& sentence);
     const Pose& recorded_pose(std::size_t frame) const; ///< the body's, else the document's
     bool is_live_frame() const;                         ///< what is shown is where the body is now
+    bool is_compared_with_original() const;             ///< every vertex of the frame shown is known
     void show_last_frame();
     void replay_frame();
     void commit_recording(const QString& name = {}, const std::string& merge = {});
+    std::shared_ptr<const Mesh> original_surface() const;
+    bool is_refused_without_poses();
     void save(const QString& title, const std::string& path, std::function<Result<QString>(const RunContext&)> work,
               std::function<void()> then = {});
 

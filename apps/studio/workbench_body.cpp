@@ -88,6 +88,7 @@ void Workbench::put_out_torch() {
 
 std::shared_ptr<const Mesh> Workbench::melt_surface() const {
     if (mode_ != Mode::body) return nullptr;
+    if (shows_original()) return original_surface();
     if (!playback_.has_body()) return state().recording ? state().recording->surface(frame_) : nullptr;
     return playback_.surface(std::min(frame_, playback_.recording().frames.size() - 1));
 }
@@ -273,8 +274,11 @@ void Workbench::go_to_frame(std::size_t frame) {
 Box Workbench::motion_box(std::size_t frame) const {
     const Vec3d origin = state().model->mesh.origin;
     const auto surface = playback_.has_body() ? playback_.surface(frame) : state().recording->surface(frame);
-    Box box = bounds(surface ? surface->positions : recorded_pose(frame).positions);
-    if (!surface) {
+    const bool moves_itself = !playback_.has_body() && !state().recording->has_poses();
+    Box box = bounds(moves_itself ? state().recording->original->frames[frame]
+                     : surface    ? surface->positions
+                                  : recorded_pose(frame).positions);
+    if (!surface && !moves_itself) {
         const Box rest = bounds(state().model->mesh.positions), driver = bounds(driver_positions(*state().model));
         const double margin = std::max((driver.min - rest.min).maxCoeff(), (rest.max - driver.max).maxCoeff());
         box.min -= Vec3d::Constant(std::max(margin, 0.0));

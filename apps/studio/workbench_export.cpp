@@ -109,7 +109,7 @@ void Workbench::set_glb_settings(const GlbSettings& settings) { impl_->glb_setti
 
 void Workbench::export_animation(const std::string& path) {
     commit_recording();
-    if (!state().recording) return Q_EMIT told("There is nothing recorded yet.", true, "body.play");
+    if (is_refused_without_poses()) return;
     const Result<AnimationFormat> format = animation_format(path_of(path));
     if (!format) return Q_EMIT told(QString::fromStdString(about_file(path, format.error().message)), true);
     if (*format == AnimationFormat::numbered) return export_meshes(path);

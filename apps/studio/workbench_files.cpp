@@ -2,12 +2,14 @@
 #include "workbench_impl.h"
 
 #include "motion_cameras.h"
+#include "motion_file.h"
 #include "pins.h"
 #include "words.h"
 
 #include "filigree/blend/pose_mesh.h"
 #include "filigree/file.h"
 #include "filigree/io/animation/point_cache.h"
+#include "filigree/io/gltf/gltf.h"
 #include "filigree/io/model/model_file.h"
 #include "filigree/io/system/file.h"
 #include "filigree/io/system/numbered_name.h"
@@ -53,6 +55,8 @@ Result<State> read_state(const std::string& path, const RunContext& context) {
             state.recording = std::move(recording);
         }
         file.mesh = level_mesh(*state.model, state.model->finest_level());
+    } else if (is_gltf(*bytes)) {
+        return gltf_state(path, 0, {}, context);
     } else {
         Result<MeshFile> read = read_mesh(*bytes, path, context);
         if (!read) return read.error();
@@ -109,14 +113,19 @@ Result<std::optional<State>> first_look(const std::string& path, const BodySetti
 }
 
 /// What was opened, in a sentence.
-QString summary(const State& state) {
+QString opened_text(const State& state) {
     const Mesh& mesh = state.source->mesh;
     QString text =
         QString("%1: %2, %3; driver of %4")
             .arg(QString::fromStdString(state.source->name), counted(mesh.vertex_count(), "vertex", "vertices"),
                  counted(mesh.face_count(), "face", "faces"), with_commas(state.model->driver().vertices.size()));
-    if (state.recording) text += ", " + counted(state.recording->frames.size(), "recorded frame", "recorded frames");
+    if (state.recording && state.recording->original)
+        text += ", " + counted(state.recording->frames.size(), "frame", "frames");
+    else if (state.recording)
+        text += ", " + counted(state.recording->frames.size(), "recorded frame", "recorded frames");
     text += '.';
+    if (!state.source->contents.empty())
+        text += " The file also has " + QString::fromStdString(state.source->contents) + '.';
     if (!state.source->warnings.empty()) {
         text += ' ' + QString::fromStdString(state.source->warnings[0]);
         if (const std::size_t more = state.source->warnings.size() - 1; more > 0)
@@ -139,7 +148,8 @@ bool is_deformed(const State& state) { return !state.warps.none() || state.handl
 /// and settings are how it is shown.
 std::vector<QString> lost_with_model(const State& state) {
     std::vector<QString> result;
-    if (state.recording && is_deformed(state)) result.push_back("the deformation");
+    if (state.recording && !state.recording->has_poses()) result.push_back("the animation");
+    if (state.recording && state.recording->has_poses() && is_deformed(state)) result.push_back("the deformation");
     if (has_pins(state.handles)) result.push_back("the pins");
     return result;
 }
@@ -201,10 +211,12 @@ std::vector<std::string> existing_outputs(const std::string& pattern, std::size_
 }
 
 void Workbench::open(const std::string& path) {
+    if (is_point_cache(path)) return open_motion(path);
     pause();
     forget_measuring();
     jobs_.drop(kModelTopic);
     jobs_.drop(kSourceTopic);
+    jobs_.drop(kFitTopic);
     if (!is_large_stream(path)) return open_whole(path, nullptr);
     jobs_.start<std::optional<State>>(
         "Opening " + file_name(path), kOpenTopic,
@@ -237,14 +249,14 @@ void Workbench::open_whole(const std::string& path, std::shared_ptr<const Source
                 return Q_EMIT told("The document was changed while " + file_name(path) + " was read; open it again.",
                                    true, "file.open");
             if (is_warped_look) state.warps = now.warps;
-            const QString text = summary(state);
+            const QString text = opened_text(state);
             const bool has_motion = state.recording != nullptr;
             if (look)
                 document_.replace(std::move(state)); // seen from where the first look was
             else
                 replace_document(std::move(state));
             if (!look || has_motion) set_mode(has_motion ? Mode::body : Mode::deform);
-            Q_EMIT told(text, false);
+            Q_EMIT told(text, false, can_fit() ? "panel.fit" : "");
         },
         {.is_urgent = look != nullptr});
 }
@@ -279,7 +291,7 @@ void Workbench::save_model(const std::string& path) {
     const std::uint64_t id = document_.state_id();
     const bool is_whole = lost_with_model(state()).empty();
     QString sentence = "Saved " + file_name(path);
-    if (state().recording)
+    if (state().recording && state().recording->has_poses())
         sentence += " with its recording";
     else if (is_deformed(state()))
         sentence += " as it is deformed";
@@ -291,7 +303,7 @@ void Workbench::save_model(const std::string& path) {
         [path, state = state(), sentence](const RunContext& context) -> Result<QString> {
             PoseSequence poses;
             Pose pose = deformed_pose(state, context);
-            if (state.recording)
+            if (state.recording && state.recording->has_poses())
                 poses = state.recording->poses();
             else if (!pose.positions.empty())
                 poses.frames.push_back(std::move(pose));
@@ -327,7 +339,7 @@ void Workbench::export_meshes(const std::string& pattern) {
                                                              "in frame_%04d.obj.",
                            true);
     commit_recording();
-    if (!state().recording) return Q_EMIT told("There is nothing recorded yet.", true, "body.play");
+    if (is_refused_without_poses()) return;
     save("Exporting meshes", pattern, [state = state(), name = *name](const RunContext& context) {
         return write_frames(state, *state.recording, name, context);
     });
@@ -335,6 +347,7 @@ void Workbench::export_meshes(const std::string& pattern) {
 
 void Workbench::export_film(const std::string& path, const FilmSettings& settings) {
     commit_recording();
+    if (state().recording && is_refused_without_poses()) return;
     const ViewSettings& view = view_.settings();
     auto film = std::make_shared<ModelFilm>();
     film->model = state().model;

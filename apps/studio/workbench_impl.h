@@ -16,7 +16,8 @@ Result<State> state_of_shape(State state, const Shape& shape, const RunContext& 
 double milliseconds_since(std::chrono::steady_clock::time_point begin);
 
 // Topics of work.
-inline const std::string kModelTopic = "model", kOpenTopic = "open", kBodyTopic = "body", kSourceTopic = "source";
+inline const std::string kModelTopic = "model", kOpenTopic = "open", kBodyTopic = "body", kSourceTopic = "source",
+                         kFitTopic = "fit";
 
 struct Workbench::Impl {
     RunContext context;            ///< of what is done at once
@@ -34,7 +35,15 @@ struct Workbench::Impl {
     QuadRemeshOptions quad_options;
     PieceOptions piece_options;
     GlbSettings glb_settings;
-    double shown_apart = 0; ///< how far pieces are apart in the pose shown
+    FitSettings fit_settings;
+    /// The animation's mesh in the frame that is shown, made when it is first asked for.
+    struct {
+        std::shared_ptr<const MovingMesh> of;
+        std::size_t frame = 0;
+        std::shared_ptr<const Mesh> mesh;
+    } original;
+    double shown_apart = 0;      ///< how far pieces are apart in the pose shown
+    bool shown_original = false; ///< as the view's settings said last
 
     QTimer replay;
     After then = After::nothing; ///< once the body is made

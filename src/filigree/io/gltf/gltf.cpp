@@ -154,6 +154,12 @@ std::size_t GltfScene::joint_count() const {
     return count;
 }
 
+std::size_t GltfScene::morph_count() const {
+    std::size_t most = 0;
+    for (const auto& geometry : scene_->geometries) most = std::max(most, geometry.targets.size());
+    return most;
+}
+
 const std::string& GltfScene::export_report() const { return scene_->export_report; }
 
 Status GltfScene::positions(std::size_t animation, double seconds, std::span<Vec3f> out,

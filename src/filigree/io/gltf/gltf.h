@@ -50,6 +50,7 @@ public:
     const std::vector<std::string>& warnings() const;
     const std::vector<GltfAnimation>& animations() const;
     std::size_t joint_count() const; ///< of its skins together
+    std::size_t morph_count() const; ///< morph targets of the mesh that has most
     /// Names of the files that buffers and pictures lie in, as the document has them.
     const std::vector<std::string>& files_beside() const;
 

@@ -1,0 +1,156 @@
+// Animations of other programs, and drivers that are fitted to them.
+#include "workbench_impl.h"
+
+#include "fitting.h"
+#include "motion_file.h"
+#include "words.h"
+
+namespace filigree::studio {
+
+const FitSettings& Workbench::fit_settings() const { return impl_->fit_settings; }
+
+void Workbench::set_fit_settings(const FitSettings& settings) {
+    if (settings == impl_->fit_settings) return;
+    const bool is_another_rate = settings.frames_per_second != impl_->fit_settings.frames_per_second;
+    impl_->fit_settings = settings;
+    Q_EMIT fit_settings_changed();
+    if (!can_fit()) return;
+    const MovingMesh& original = *state().recording->original;
+    if (is_another_rate && original.frames_per_second != settings.frames_per_second)
+        open_motion(original.path, original.clip);
+    else if (state().recording->fitted || jobs_.is_pending(kFitTopic))
+        fit(); // the newest error replaces the one in progress
+}
+
+bool Workbench::shows_original() const {
+    const auto& recording = state().recording;
+    if (mode_ != Mode::body || playback_.has_body() || !recording || !recording->original) return false;
+    return !recording->fitted || view_.settings().original;
+}
+
+bool Workbench::is_compared_with_original() const {
+    const auto& recording = state().recording;
+    return mode_ == Mode::body && !playback_.has_body() && recording && recording->original && recording->fitted;
+}
+
+std::shared_ptr<const Mesh> Workbench::original_surface() const {
+    const auto& of = state().recording->original;
+    auto& kept = impl_->original;
+    if (kept.of == of && kept.frame == frame_ && kept.mesh) return kept.mesh;
+    auto mesh = std::make_shared<Mesh>(state().source->mesh);
+    mesh->positions = of->frames[std::min(frame_, of->frames.size() - 1)];
+    mesh->normals = {}; // of the shape at rest
+    kept = {of, frame_, std::move(mesh)};
+    return kept.mesh;
+}
+
+/// Tells why a recording cannot leave.
+bool Workbench::is_refused_without_poses() {
+    if (!state().recording) {
+        Q_EMIT told("There is nothing recorded yet.", true, "body.play");
+        return true;
+    }
+    if (state().recording->has_poses()) return false;
+    Q_EMIT told("The animation moves its mesh alone: fit a driver to it first.", true, "fit.make");
+    return true;
+}
+
+void Workbench::open_motion(const std::string& path, std::size_t clip) {
+    pause();
+    forget_measuring();
+    for (const std::string& topic : {kModelTopic, kSourceTopic, kFitTopic}) jobs_.drop(topic);
+    struct Opened {
+        State state;
+        std::vector<std::string> warnings;
+    };
+    const bool is_cache = is_point_cache(path);
+    jobs_.start<Opened>(
+        "Opening " + file_name(path), kOpenTopic,
+        [path, clip, is_cache, now = state(),
+         rate = impl_->fit_settings.frames_per_second](const RunContext& context) -> Result<Opened> {
+            const auto about = [&](const Error& error) {
+                return error.code == ErrorCode::cancelled ? error : Error{error.code, about_file(path, error.message)};
+            };
+            Opened opened;
+            if (is_cache) {
+                auto recording = cache_recording(path, now, rate, opened.warnings, context);
+                if (!recording) return about(recording.error());
+                opened.state = now;
+                opened.state.recording = std::move(*recording);
+                return opened;
+            }
+            Result<State> state =
+                is_numbered(path) ? numbered_state(path, rate, context) : gltf_state(path, clip, rate, context);
+            if (!state) return about(state.error());
+            if (!state->recording)
+                return about({ErrorCode::unsuitable, "has no animation: open an animated glTF (.glb, .gltf), a point "
+                                                     "cache (.pc2, .mdd), or one of several numbered meshes."});
+            state->body = now.body;
+            opened.state = std::move(*state);
+            opened.warnings = opened.state.source->warnings;
+            return opened;
+        },
+        [this, path, is_cache, id = document_.state_id()](Opened opened) {
+            if (document_.state_id() != id)
+                return Q_EMIT told("The document was changed while " + file_name(path) + " was read; open it again.",
+                                   true, "fit.open");
+            const Recording& recording = *opened.state.recording;
+            QString text = QString("%1: %2 of %3, %4 a second.")
+                               .arg(file_name(path), counted(recording.frames.size(), "frame", "frames"),
+                                    counted(opened.state.source->mesh.vertex_count(), "vertex", "vertices"),
+                                    number_text(recording.frames_per_second));
+            for (const std::string& warning : opened.warnings) text += ' ' + QString::fromStdString(warning);
+            frame_ = 0;
+            if (is_cache) {
+                document_.change("Open " + file_name(path), std::move(opened.state));
+                Q_EMIT opened_motion();
+            } else {
+                replace_document(std::move(opened.state));
+            }
+            set_mode(Mode::body);
+            show_pose();
+            Q_EMIT timeline_changed();
+            Q_EMIT told(text, false, "fit.make");
+        });
+}
+
+void Workbench::fit() {
+    if (!can_fit()) return Q_EMIT told("There is no animation to follow.", true, "fit.open");
+    if (is_refused(kOpenTopic, "A file is being opened: fit once it is there, or cancel.")) return;
+    jobs_.start<State>(
+        "Fitting", kFitTopic,
+        [state = state(), error = impl_->fit_settings.error](const RunContext& context) {
+            return fitted_state(state, error, context);
+        },
+        [this, original = state().recording->original, key = document_.merge_key("fit")](const State& made) {
+            if (!can_fit() || state().recording->original != original) return;
+            State next = state();
+            next.model = made.model;
+            next.strip = made.strip;
+            next.restore.level = made.model->finest_level();
+            next.handles.clear();
+            next.handle_pose = nullptr;
+            next.pose_from_file = false;
+            next.recording = made.recording;
+            const std::size_t frame = frame_;
+            document_.change("Fit", std::move(next), key);
+            view_.edit([](ViewSettings& settings) { settings.original = false; });
+            frame_ = std::min(frame, frame_count() - 1);
+            set_mode(Mode::body);
+            show_pose();
+            Q_EMIT timeline_changed();
+            Q_EMIT told(fit_summary(*state().recording), false);
+        });
+}
+
+void Workbench::save_packed(const std::string& path) {
+    if (!can_fit() || !state().recording->fitted) return Q_EMIT told("Nothing is fitted yet.", true, "fit.make");
+    save("Saving " + file_name(path), path,
+         [path, fitted = state().recording->fitted](const RunContext&) -> Result<QString> {
+             if (const Status written = write_file(path_of(path), fitted->packed); !written) return written.error();
+             return QString("Saved %1: packed, %2 of the diagonal off (rms).")
+                 .arg(file_name(path), number_text(fitted->packed_rms, 2));
+         });
+}
+
+} // namespace filigree::studio
