@@ -32,6 +32,7 @@ PictureCamera::PictureCamera(Workbench& workbench, DrawnObjects& drawn, const QW
     connect(&timer_, &QTimer::timeout, this, &PictureCamera::fly_on);
     connect(&workbench.view(), &ViewState::changed, this, &PictureCamera::follow_view);
     connect(&workbench, &Workbench::opened, this, &PictureCamera::follow_opened);
+    connect(&workbench, &Workbench::opened_motion, this, &PictureCamera::follow_opened);
     connect(&workbench, &Workbench::pose_changed, this, &PictureCamera::follow_motion);
     connect(&workbench.view(), &ViewState::changed, this, &PictureCamera::follow_motion);
     connect(&workbench, &Workbench::mode_changed, this, &PictureCamera::follow_body);

@@ -185,6 +185,7 @@ Q_SIGNALS:
     void fit_settings_changed();
     void piece_options_changed();
     void opened();                       ///< another mesh or model than before
+    void opened_motion();                ///< an animation of the mesh there is
     void saved(const std::string& path); ///< by save_model
     /// For the window's message bar. action: the name of one that settles it with a click; "": none.
     void told(const QString& sentence, bool is_error, const QString& action = {});

@@ -125,7 +125,10 @@ QString opened_text(const State& state) {
         text += ", " + counted(state.recording->frames.size(), "recorded frame", "recorded frames");
     text += '.';
     if (!state.source->contents.empty())
-        text += " The file also has " + QString::fromStdString(state.source->contents) + '.';
+        text += " The file has " + QString::fromStdString(state.source->contents) + '.';
+    if (state.recording && state.recording->original)
+        text += QString(" Play shows '%1'. Fit makes a small model of it.")
+                    .arg(QString::fromStdString(state.recording->original->clips[state.recording->original->clip]));
     if (!state.source->warnings.empty()) {
         text += ' ' + QString::fromStdString(state.source->warnings[0]);
         if (const std::size_t more = state.source->warnings.size() - 1; more > 0)
