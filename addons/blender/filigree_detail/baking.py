@@ -7,7 +7,7 @@ import tempfile
 import bpy
 import numpy as np
 
-from . import follow, meshes, nodes
+from . import follow, meshes, models, nodes
 from .binding import BAKED
 from .jobs import JobOperator
 from .library import filigree
@@ -79,7 +79,8 @@ class FILIGREE_OT_bake(JobOperator, bpy.types.Operator):
                     pose = follow.driver_pose(high, context.evaluated_depsgraph_get())
                     if isinstance(pose, str):
                         raise filigree.MismatchError(f"Frame {frame}: {pose}")
-                    cache.write(follow.restore(high, pose)[:count])
+                    fitted = models.fitted_pose(high.filigree, scene.frame_current_final, pose)
+                    cache.write(follow.restore(high, pose if fitted is None else fitted)[:count])
                     yield ("bake", (frame - first + 1) / (last - first + 1))
         finally:
             scene.frame_set(before)

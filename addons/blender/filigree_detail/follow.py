@@ -53,7 +53,7 @@ def driver_pose(high, depsgraph):
 
 
 def restore(high, pose, level=None):
-    """Positions of `high`'s vertices for a pose of its driver, (n, 3). Of an older file's model the driver's may stand behind them."""
+    """Positions of `high`'s vertices for a pose of its driver (or its positions), (n, 3). Of an older file's model the driver's may stand behind them."""
     restorer, out = models.restorer_of(high.filigree, level)
     return restorer.positions(pose, out=out)
 
@@ -70,6 +70,8 @@ def _place(high, depsgraph):
     pose = driver_pose(high, depsgraph)
     if isinstance(pose, str):
         return pose
+    fitted = models.fitted_pose(settings, depsgraph.scene.frame_current_final, pose)
+    pose = pose if fitted is None else fitted
     level_object = settings.level_object
     if level_object is not None and depsgraph.mode == "VIEWPORT":
         level = level_object.get("filigree_level")

@@ -11,8 +11,10 @@ import numpy as np
 
 from .library import filigree
 
-_BYTES, _KEY = "filigree_model", "filigree_key"
+_BYTES, _KEY, _POSES, _FIRST = "filigree_model", "filigree_key", "filigree_poses", "filigree_first_frame"
+_SAME = 1e-4  # of the driver's diagonal: how near a driver is to a fitted pose that is the one it plays
 _models = {}  # key -> model; read from the file when first asked for
+_poses = {}  # key -> positions (f, d, 3) and gradients (f, d, 3, 3) that were fitted
 _restorers = {}  # key and options -> restorer and the array it writes into
 
 
@@ -37,12 +39,14 @@ def remove(text):
 def forget(text):
     key = text.get(_KEY)
     _models.pop(key, None)
+    _poses.pop(key, None)
     for known in [k for k in _restorers if k[0] == key]:
         del _restorers[known]
 
 
 def forget_all():
     _models.clear()
+    _poses.clear()
     _restorers.clear()
 
 
@@ -67,3 +71,35 @@ def restorer_of(settings, level=None):
         restorer = filigree.Restorer(model, level=level)
         _restorers[key] = (restorer, np.empty((len(restorer), 3), np.float32))
     return _restorers[key]
+
+
+def keep_poses(text, poses, frames):
+    """Keeps fitted poses, one a frame of the scene, beside the model: their gradients are better than any that positions
+    tell."""
+    numbers = [np.concatenate((pose.positions[:, None, :], pose.gradients), axis=1) for pose in poses]
+    text[_POSES] = np.ascontiguousarray(numbers, "<f4").tobytes()
+    text[_FIRST] = frames[0]
+
+
+def has_poses(settings):
+    return settings.model is not None and _POSES in settings.model
+
+
+def fitted_pose(settings, frame, positions):
+    """The fitted pose of a frame of the scene (a float), or None where there is none or the driver is elsewhere: something
+    else moves it."""
+    text = settings.model
+    if not has_poses(settings):
+        return None
+    key = text[_KEY]
+    if key not in _poses:
+        _poses[key] = np.frombuffer(text[_POSES], "<f4").reshape(-1, len(positions), 4, 3)
+    poses = _poses[key]
+    at = min(max(frame - text[_FIRST], 0), len(poses) - 1)
+    before = int(at)
+    after, share = min(before + 1, len(poses) - 1), at - before
+    numbers = (1 - share) * poses[before] + share * poses[after] if share > 0 else poses[before]
+    apart = np.abs(numbers[:, 0] - positions).max()
+    if apart > _SAME * np.linalg.norm(np.ptp(positions, axis=0)):
+        return None
+    return filigree.Pose(numbers[:, 0], numbers[:, 1:])

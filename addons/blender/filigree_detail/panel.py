@@ -2,7 +2,7 @@
 
 import bpy
 
-from . import binding, simulating
+from . import binding, models, simulating
 from .library import filigree, missing
 
 
@@ -24,7 +24,7 @@ def _warnings(context, high):
         cache = getattr(modifier, "point_cache", None)
         if cache is not None and not cache.is_baked:
             yield f"{modifier.name} of {driver.name} is not baked: renders in the background stand still"
-    if high.data.shape_keys is not None:
+    if high.data.shape_keys is not None and not models.has_poses(settings):
         yield "Shape keys of the detailed mesh itself are not seen: put them on the driver"
 
 
@@ -64,6 +64,9 @@ class FILIGREE_PT_detail(_Panel, bpy.types.Panel):
         layout.prop(window, "filigree_vertices")
         layout.operator("filigree.make_driver", icon="MOD_DECIM").vertices = window.filigree_vertices
         layout.operator("filigree.bind", icon="LINKED")
+        layout.separator()
+        layout.prop(window, "filigree_error")
+        layout.operator("filigree.fit", icon="MOD_MESHDEFORM").error = window.filigree_error
 
     def _draw_bound(self, layout, context, high):
         settings = high.filigree
@@ -83,6 +86,7 @@ class FILIGREE_PT_detail(_Panel, bpy.types.Panel):
         row.operator("filigree.update", icon="FILE_REFRESH")
         row.operator("filigree.unbind", icon="UNLINKED")
         layout.operator("filigree.bake", icon="REC")
+        layout.operator("filigree.export", icon="EXPORT")
         layout.operator("filigree.show_error", icon="SHADERFX")
 
 
@@ -117,6 +121,9 @@ _CLASSES = (FILIGREE_PT_detail, FILIGREE_PT_body)
 def register():
     bpy.types.WindowManager.filigree_vertices = bpy.props.IntProperty(
         name="Driver Vertices", default=1000, min=4, soft_max=20000, description="Vertices of the driver, about")
+    bpy.types.WindowManager.filigree_error = bpy.props.FloatProperty(
+        name="Error", default=1e-4, min=1e-6, max=0.1, precision=6,
+        description="Largest error of a fit: root of the mean square, as a fraction of the diagonal")
     for cls in _CLASSES:
         bpy.utils.register_class(cls)
 
@@ -124,4 +131,5 @@ def register():
 def unregister():
     for cls in reversed(_CLASSES):
         bpy.utils.unregister_class(cls)
+    del bpy.types.WindowManager.filigree_error
     del bpy.types.WindowManager.filigree_vertices
