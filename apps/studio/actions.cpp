@@ -7,6 +7,7 @@
 #include "motion_file.h"
 #include "panels/panels.h"
 #include "pins.h"
+#include "softness.h"
 #include "tools/tool.h"
 #include "window.h"
 #include "words.h"
@@ -191,12 +192,19 @@ struct Actions::Impl {
                  workbench.fit();
              },
              [this] { return workbench.can_fit(); }},
+            {"flesh.make", "Make f&lesh", "Makes soft matter of the character, in the background", "Ctrl+Shift+B",
+             [this] {
+                 window.show_panel("flesh");
+                 workbench.make_flesh();
+             },
+             [this] { return workbench.can_make_flesh(); }},
             {"fit.save_packed", "Save pac&ked…", "Saves the fitted model in few bytes", "",
              [this] {
                  save_to({"fit.save_packed", "Save the fitted model", {kModels, kAll}, "fil", proposal("_fitted.fil")},
                          &Workbench::save_packed);
              },
-             [this] { return workbench.can_fit() && workbench.state().recording->fitted; }, icon(Icon::save)},
+             [this] { return has_model() && workbench.state().recording && workbench.state().recording->fitted; },
+             icon(Icon::save)},
             kSeparator,
             {"file.quit", "&Quit", "Leaves; asks about unsaved changes first", "Ctrl+Q", [this] { window.close(); }},
         };
@@ -339,6 +347,12 @@ struct Actions::Impl {
                  window.show_panel("body");
              },
              has_model, icon(Icon::animate)},
+            {"body.clear_softness", "C&lear softness", "Takes away the painted softness", "",
+             [this] {
+                 workbench.set_softness(nullptr);
+                 workbench.end_painting();
+             },
+             [this] { return has_model() && softness_of(workbench.state()) != nullptr; }},
             {"body.wax", "Make it &wax", "Makes the body of wax, which melts, and drops it", "", [this] { make_wax(); },
              has_model},
             kSeparator,

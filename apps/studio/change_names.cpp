@@ -59,6 +59,7 @@ QString name_of_change(const BodySettings& before, const BodySettings& after) {
                     {before.particles != after.particles, counted(after.particles, "particle", "particles")},
                     {before.size != after.size, "Size of the body"},
                     {before.strength != after.strength, "Strength"},
+                    {before.softest != after.softest, "Stiffness where painted"},
                     {before.drop != after.drop, "Height of the drop"},
                     {before.air_temperature != after.air_temperature, "Air"},
                     {before.melting_time != after.melting_time, "Melting time"},

@@ -1,5 +1,6 @@
 #include "coloring.h"
 
+#include "softness.h"
 #include "tools/tool.h"
 
 #include <algorithm>
@@ -116,6 +117,20 @@ QString why_no_heat(const Seen& seen) {
                                            "the Body panel.");
 }
 
+// Softness
+
+std::optional<ColorKey> softness_key(const Seen& seen) {
+    if (seen.workbench.state().source->mesh.vertex_count() != seen.model->vertex_count()) return std::nullopt;
+    const auto softness = softness_of(seen.workbench.state());
+    return softness ? ColorKey{softness, 0} : ColorKey{seen.model, 0};
+}
+
+ColorWork softness_work(const Seen& seen) {
+    const auto softness = softness_of(seen.workbench.state());
+    return at_once(
+        {softness ? *softness : std::vector<float>(seen.model->vertex_count()), ColorMap::sequential, {0, 1}});
+}
+
 constexpr const char* kPerDiagonal = "% of the diagonal";
 
 } // namespace
@@ -164,6 +179,10 @@ const Coloring kHeatColors = {"heat",
                               {"Temperature", "°C", 1, true},
                               {.temperatures = true},
                               why_no_heat};
+
+const Coloring kSoftnessColors = {
+    "softness",    "So&ftness as colours", "Where softness is painted", "Shift+8", "Softness", softness_key,
+    softness_work, {"Softness", ""}};
 
 const std::vector<const Coloring*>& colorings() {
     static const std::vector<const Coloring*> all = [] {

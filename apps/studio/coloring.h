@@ -52,7 +52,7 @@ struct Coloring {
 };
 
 extern const Coloring kOwnColors, kErrorColors, kLevelColors, kPatchColors, kExpectedErrorColors, kPieceColors,
-    kHeatColors;
+    kHeatColors, kSoftnessColors;
 
 /// In the order of the menu: the program's own, then those that tools bring.
 const std::vector<const Coloring*>& colorings();

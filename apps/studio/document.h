@@ -3,6 +3,7 @@
 
 #include "filigree/deform/warp_steps.h"
 #include "filigree/fit.h"
+#include "filigree/flesh.h"
 #include "filigree/mesh.h"
 #include "filigree/render/surface_materials.h"
 #include "filigree/restore.h"
@@ -65,6 +66,7 @@ struct Handle {
 
 /// How a body is made, and the world it is put in.
 struct BodySettings : DropOptions {
+    double softest = 0.1; ///< stiffness where the painted softness is 1, as a multiple of the material's
     std::string preset =
         "soft-rubber"; ///< of named_materials(); "custom" once the material, which starts so, was changed
     bool operator==(const BodySettings&) const = default;
@@ -76,10 +78,25 @@ bool is_same_body(BodySettings a, const BodySettings& b);
 /// An animation of another program: what poses are to follow. Shared, and never changes.
 struct MovingMesh {
     std::string path;
-    std::vector<std::string> clips; ///< of a glTF, as they are shown
-    std::size_t clip = 0;           ///< that the frames are of
+    std::vector<std::string> clips;       ///< of a glTF, as they are shown
+    std::size_t clip = 0;                 ///< that the frames are of
+    std::vector<std::string> joints = {}; ///< names, of a skin that flesh can be made of
     double frames_per_second = 60;
-    std::vector<std::vector<Vec3f>> frames; ///< positions relative to the origin, one a vertex of the source's mesh
+    std::vector<std::vector<Vec3f>> frames =
+        {}; ///< positions relative to the origin, one a vertex of the source's mesh
+};
+
+/// What became of a character as flesh.
+struct FleshedMotion {
+    FleshReport made;
+    FleshMeasure measure;
+    std::string furthest_joint; ///< that carries the vertex that is farthest from the skin
+    std::size_t particles = 0;
+    double spacing = 0, step_seconds = 0; ///< m, s a frame
+    unsigned most_substeps = 0;
+    bool is_loop = false;
+    double loop_rms = 0;  ///< of the diagonal, before the fade
+    bool is_sound = true; ///< the motion was finite, and no substep was too long
 };
 
 /// What a fit came to. Shared, and never changes.
@@ -87,6 +104,8 @@ struct FittedMotion {
     FitReport report;
     std::string packed;                    ///< the bytes of a compact model file
     double packed_rms = 0, packed_max = 0; ///< the error of that file, fractions of the diagonal
+    /// The poses follow flesh, and the original is its skin.
+    std::optional<FleshedMotion> flesh = {};
 };
 
 /// What a body did, for the driver. Frames are shared between the steps of the history, so a longer recording costs its
@@ -124,6 +143,8 @@ struct State {
     std::shared_ptr<const Pose> handle_pose; ///< the driver as the pulls left it; null: at rest
     bool pose_from_file = false;             ///< the first pull began at a pose that a file held, not at rest
     BodySettings body;
+    /// Painted, 0 .. 1, one a vertex of the source's mesh; null: none. Of another count: of a mesh before.
+    std::shared_ptr<const std::vector<float>> softness;
     std::shared_ptr<const Recording> recording; ///< null: none
 
     unsigned level() const { return *restore.level; }

@@ -64,26 +64,36 @@ Status pack(const Model& model, const PoseSequence& poses, const MeshAnimation& 
 
 } // namespace
 
+Result<FittedMotion> fit_to(const MeshAnimation& animation, const FitOptions& options, double packed_error,
+                            State& state, const RunContext& context) {
+    Result<Fitted> made = fit_animation(animation, options, context);
+    if (!made) return made.error();
+    FittedMotion fitted;
+    fitted.report = made->report;
+    if (const Status packed = pack(made->model, made->poses, animation, packed_error, fitted, context); !packed)
+        return packed.error();
+    auto recording = std::make_shared<Recording>();
+    recording->frames_per_second = animation.frames_per_second;
+    for (Pose& pose : made->poses.frames) recording->frames.push_back(std::make_shared<const Pose>(std::move(pose)));
+    state.strip.base = made->report.driver_vertices;
+    state.model = std::make_shared<const Model>(std::move(made->model));
+    state.recording = std::move(recording);
+    return fitted;
+}
+
 Result<State> fitted_state(State state, double error, const RunContext& context) {
     const auto original = state.recording->original;
-    const MeshAnimation animation = {&state.source->mesh, original->frames.size(), original->frames_per_second,
+    const auto source = state.source;
+    const MeshAnimation animation = {&source->mesh, original->frames.size(), original->frames_per_second,
                                      [&](std::size_t frame, std::span<Vec3f> positions) -> Status {
                                          std::ranges::copy(original->frames[frame], positions.begin());
                                          return Success{};
                                      }};
-    Result<Fitted> made = fit_animation(animation, {.error = left_for_fit(error)}, context);
-    if (!made) return made.error();
-    auto fitted = std::make_shared<FittedMotion>();
-    fitted->report = made->report;
-    if (const Status packed = pack(made->model, made->poses, animation, error, *fitted, context); !packed)
-        return packed.error();
-    auto recording = std::make_shared<Recording>();
-    recording->frames_per_second = original->frames_per_second;
-    for (Pose& pose : made->poses.frames) recording->frames.push_back(std::make_shared<const Pose>(std::move(pose)));
+    Result<FittedMotion> fitted = fit_to(animation, {.error = left_for_fit(error)}, error, state, context);
+    if (!fitted) return fitted.error();
+    auto recording = std::make_shared<Recording>(*state.recording);
     recording->original = original;
-    recording->fitted = std::move(fitted);
-    state.strip.base = made->report.driver_vertices;
-    state.model = std::make_shared<const Model>(std::move(made->model));
+    recording->fitted = std::make_shared<const FittedMotion>(std::move(*fitted));
     state.recording = std::move(recording);
     return state;
 }

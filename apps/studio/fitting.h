@@ -10,6 +10,11 @@ namespace filigree::studio {
 /// fit_animation and pack_model.
 Result<State> fitted_state(State state, double error, const RunContext& context);
 
+/// Fits a driver to any animation: the state gets the model and the recording. packed_error: rms that packing may add,
+/// fraction of the diagonal. Errors: those of fit_animation and pack_model.
+Result<FittedMotion> fit_to(const MeshAnimation& animation, const FitOptions& options, double packed_error,
+                            State& state, const RunContext& context);
+
 /// Of a recording that is fitted: a sentence, and rows of names and values (rich text).
 QString fit_summary(const Recording& recording);
 QString fit_table(const Recording& recording);

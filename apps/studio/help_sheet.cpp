@@ -25,7 +25,7 @@ struct Group {
 constexpr std::array kGroups = {
     Group{"File", "file", 0},
     Group{"Edit", "edit", 0},
-    Group{"Detail and deformation", "quads detail deform fracture fit tool", 1},
+    Group{"Detail and deformation", "quads detail deform fracture fit flesh tool", 1},
     Group{"Body and time", "body", 1},
     Group{"Panels and help", "panel help", 1},
     Group{"View", "view", 2},

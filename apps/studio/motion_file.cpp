@@ -7,6 +7,7 @@
 #include "filigree/io/gltf/gltf.h"
 #include "filigree/io/system/extension.h"
 #include "filigree/io/system/numbered_name.h"
+#include "filigree/skin.h"
 
 #include <algorithm>
 #include <cmath>
@@ -92,6 +93,11 @@ bool is_point_cache(const std::string& path) {
     return extension == ".pc2" || extension == ".mdd";
 }
 
+bool is_gltf_file(const std::string& path) {
+    const std::string extension = lower_extension(path_of(path));
+    return extension == ".glb" || extension == ".gltf";
+}
+
 bool is_numbered(const std::string& path) {
     const fs::path one = path_of(path);
     if (!mesh_format(one) || all_but_number(one) == one.stem().string()) return false;
@@ -115,7 +121,11 @@ Result<State> gltf_state(const std::string& path, std::size_t clip, std::optiona
     State state;
     state.source = source;
     if (clip < clips.size() && scene->mesh().face_count() > 0) {
-        MovingMesh original{path, clips, clip, frames_per_second.value_or(kUsualRate), {}};
+        MovingMesh original{path, clips, clip, {}, frames_per_second.value_or(kUsualRate)};
+        if (scene->joint_count() > 0)
+            if (const Result<SkinnedMesh> skin = read_skin(path_of(path), context)) // else flesh is refused, with why
+                for (const SkinJoint& joint : skin->joints)
+                    if (!joint.is_node_of_mesh) original.joints.push_back(joint.name);
         const GltfAnimation& animation = scene->animations()[clip];
         const double seconds = std::max(0.0, animation.last_key - animation.first_key);
         const auto frames = std::size_t(std::lround(seconds * original.frames_per_second)) + 1;
@@ -138,7 +148,7 @@ Result<State> numbered_state(const std::string& path, double frames_per_second, 
     const fs::path pattern = pattern_of(path_of(path));
     Result<MeshFile> file = read_mesh(path_of(path), context);
     if (!file) return file.error();
-    MovingMesh original{path, {}, 0, frames_per_second, {}};
+    MovingMesh original{path, {}, 0, {}, frames_per_second};
     Result<MeshAnimation> animation =
         open_animation(pattern, file->mesh, {.frames_per_second = frames_per_second}, context);
     if (!animation) return animation.error();
@@ -179,7 +189,7 @@ Result<std::shared_ptr<const Recording>> cache_recording(const std::string& path
     if (const std::string turned = turned_first_frame(mesh.positions, frames->front(), mesh.origin, path_of(path));
         !turned.empty())
         warnings.push_back(turned);
-    return unfitted({path, {}, 0, animation->frames_per_second, std::move(*frames)}, *state.model);
+    return unfitted({path, {}, 0, {}, animation->frames_per_second, std::move(*frames)}, *state.model);
 }
 
 } // namespace filigree::studio

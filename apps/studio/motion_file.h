@@ -9,6 +9,7 @@ namespace filigree::studio {
 
 /// Whether a file holds positions alone, of a mesh that another file has: .pc2, .mdd.
 bool is_point_cache(const std::string& path);
+bool is_gltf_file(const std::string& path); ///< by its name
 /// Whether a mesh is one of several that are numbered, in its folder.
 bool is_numbered(const std::string& path);
 

@@ -4,6 +4,7 @@
 #include "jobs.h"
 #include "pieces.h"
 #include "pins.h"
+#include "softness.h"
 
 #include "filigree/present/textured_look.h"
 #include "filigree/render.h"
@@ -51,7 +52,8 @@ Result<std::shared_ptr<const DroppedBody>> make_body_of(const State& state, cons
         if (!found) return found.error();
         look = std::move(*found);
     }
-    return make_dropped_body(state.model, breaking, look, state.body, pinned_vertices(state.handles), up, context);
+    auto made = make_dropped_body(state.model, breaking, look, state.body, pinned_vertices(state.handles), up, context);
+    return made ? softened(std::move(*made), state, context) : made;
 }
 
 struct Playback::Worker {

@@ -8,12 +8,12 @@
 namespace filigree::studio {
 namespace {
 
-/// Seven tabs fit the column.
+/// Nine tabs fit the column.
 class NarrowTabs : public QProxyStyle {
 public:
     using QProxyStyle::QProxyStyle;
     int pixelMetric(PixelMetric metric, const QStyleOption* option, const QWidget* widget) const override {
-        constexpr int kTabSpace = 12; // beside a tab's text, both sides together
+        constexpr int kTabSpace = 6; // beside a tab's text, both sides together
         return metric == PM_TabBarTabHSpace ? kTabSpace : QProxyStyle::pixelMetric(metric, option, widget);
     }
 };

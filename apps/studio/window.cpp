@@ -150,6 +150,7 @@ struct MainWindow::Impl {
             {make_body_panel(*workbench, *actions), "A body that falls, bounces and can be pulled"},
             {make_fracture_panel(*workbench, *actions), "Where the mesh breaks, and how hard that is"},
             {make_fit_panel(*workbench, *actions), "A small model that follows any animation"},
+            {make_flesh_panel(*workbench, *actions), "Soft matter that a skeleton moves"},
             {make_view_panel(*workbench, *viewport, window), "How the mesh is shown"},
         }};
         for (std::size_t k = 0; k < pages.size(); ++k) {

@@ -38,6 +38,18 @@ struct FitSettings {
     bool operator==(const FitSettings&) const = default;
 };
 
+/// How a character becomes flesh.
+struct FleshSettings {
+    double stiffness = flesh_material().young_modulus; ///< Pa
+    double core = 0.5;                                 ///< FleshOptions::core
+    double damping = 3;                                ///< 1/s
+    std::size_t particles = 3000, joints = 300;        ///< about; of the flesh, of the result
+    std::vector<std::string> soft = {};                ///< joints that hold little, with all below them
+    double strength = SoftJoints().strength;           ///< of these
+    bool loop = false, ground = false;
+    bool operator==(const FleshSettings&) const = default;
+};
+
 /// The files that stand where an export of so many pictures or meshes to "frame_%04d.obj" would write; of a path
 /// without a number the file itself, if it is there. For whoever asks before they are replaced.
 std::vector<std::string> existing_outputs(const std::string& pattern, std::size_t frames);
@@ -95,8 +107,12 @@ public:
     /// An animated glTF becomes the document, at a clip; so do numbered meshes, of which one is named. The frames of a
     /// .pc2 or .mdd move the mesh there is.
     void open_motion(const std::string& path, std::size_t clip = 0);
-    void fit(); ///< a driver and poses that follow the animation, in the background
-    bool can_fit() const { return state().recording && state().recording->original; }
+    void fit();                                  ///< a driver and poses that follow the animation, in the background
+    bool can_fit() const;                        ///< an animation is there, and it is no skin of flesh
+    const FleshSettings& flesh_settings() const; ///< of the flesh made next; no part of the document
+    void set_flesh_settings(const FleshSettings& settings);
+    void make_flesh(); ///< of the clip, in the background; again: of the skin
+    bool can_make_flesh() const;
     void save_packed(const std::string& path); ///< the fitted model, in few bytes
     // Detail
     void set_strip(const StripOptions& options, const std::string& merge = {}); ///< strips again
@@ -117,6 +133,10 @@ public:
     void end_pull();
     void cancel_pull(); ///< the shape is what it was before; a body is let go
     bool is_pulling() const { return drag_.is_active() || playback_.is_grabbed(); }
+    // Softness, painted on the surface
+    void paint_softness(Index vertex, double radius, bool takes_away); ///< of the finest mesh; a stroke is one step
+    void end_painting();
+    void set_softness(std::shared_ptr<const std::vector<float>> softness);
     // Body
     void set_body(const BodySettings& settings, const std::string& merge = {}); ///< a body that was made is made again
     void make_body();
@@ -183,6 +203,7 @@ Q_SIGNALS:
     void inside_points_ready();
     void quad_options_changed();
     void fit_settings_changed();
+    void flesh_settings_changed();
     void piece_options_changed();
     void opened();                       ///< another mesh or model than before
     void opened_motion();                ///< an animation of the mesh there is
@@ -228,6 +249,9 @@ private:
     void commit_recording(const QString& name = {}, const std::string& merge = {});
     std::shared_ptr<const Mesh> original_surface() const;
     bool is_refused_without_poses();
+    void change_motion(const QString& title, const QString& name,
+                       std::function<Result<State>(State, const RunContext&)> make,
+                       std::function<QString(const Recording&)> summary);
     void save(const QString& title, const std::string& path, std::function<Result<QString>(const RunContext&)> work,
               std::function<void()> then = {});
 

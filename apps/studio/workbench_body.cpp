@@ -2,6 +2,7 @@
 #include "workbench_impl.h"
 
 #include "pins.h"
+#include "softness.h"
 #include "words.h"
 
 #include "filigree/scene/body_driver.h"
@@ -45,6 +46,29 @@ void Workbench::set_body(const BodySettings& settings, const std::string& merge)
 }
 
 void Workbench::make_body() { make_body_then(After::nothing); }
+
+void Workbench::paint_softness(Index vertex, double radius, bool takes_away) {
+    const Mesh& mesh = state().source->mesh;
+    if (vertex >= mesh.vertex_count()) return;
+    const auto before = softness_of(state());
+    std::vector<float> values =
+        painted(mesh, before ? *before : std::vector<float>(mesh.vertex_count()), vertex, radius, takes_away);
+    if (before && values == *before) return;
+    document_.edit(
+        "Paint softness",
+        [&](State& next) { next.softness = std::make_shared<const std::vector<float>>(std::move(values)); },
+        "softness");
+}
+
+void Workbench::set_softness(std::shared_ptr<const std::vector<float>> softness) {
+    document_.edit(
+        "Softness", [&](State& next) { next.softness = std::move(softness); }, "softness");
+}
+
+void Workbench::end_painting() {
+    document_.end_merge();
+    if (playback_.has_body()) Q_EMIT told("The body is so soft once it is made again.", false, "body.make");
+}
 
 namespace {
 

@@ -4,6 +4,7 @@
 #include "motion_cameras.h"
 #include "motion_file.h"
 #include "pins.h"
+#include "softness.h"
 #include "words.h"
 
 #include "filigree/blend/pose_mesh.h"
@@ -67,6 +68,7 @@ Result<State> read_state(const std::string& path, const RunContext& context) {
     source->warnings = std::move(file.warnings);
     source->warnings.insert(source->warnings.end(), source->materials.warnings.begin(),
                             source->materials.warnings.end());
+    state.softness = softness_in(source->mesh);
     state.source = std::move(source);
     if (!state.model) return stripped_state(std::move(state), context);
     state.restore.level = state.model->finest_level();
@@ -127,8 +129,9 @@ QString opened_text(const State& state) {
     if (!state.source->contents.empty())
         text += " The file has " + QString::fromStdString(state.source->contents) + '.';
     if (state.recording && state.recording->original)
-        text += QString(" Play shows '%1'. Fit makes a small model of it.")
-                    .arg(QString::fromStdString(state.recording->original->clips[state.recording->original->clip]));
+        text += QString(" Play shows '%1'. Fit makes a small model of it%2.")
+                    .arg(QString::fromStdString(state.recording->original->clips[state.recording->original->clip]),
+                         state.recording->original->joints.empty() ? "" : "; Flesh makes it soft");
     if (!state.source->warnings.empty()) {
         text += ' ' + QString::fromStdString(state.source->warnings[0]);
         if (const std::size_t more = state.source->warnings.size() - 1; more > 0)
@@ -310,7 +313,12 @@ void Workbench::save_model(const std::string& path) {
                 poses = state.recording->poses();
             else if (!pose.positions.empty())
                 poses.frames.push_back(std::move(pose));
-            const Status status = write_model(*state.model, poses, path_of(path), context);
+            std::optional<Model> painted; // that has the softness among its scalars
+            if (softness_of(state)) {
+                painted = *state.model;
+                painted->mesh = with_softness(std::move(painted->mesh), state);
+            }
+            const Status status = write_model(painted ? *painted : *state.model, poses, path_of(path), context);
             if (!status) return status.error();
             return sentence;
         },
@@ -325,7 +333,9 @@ void Workbench::save_mesh(const std::string& path) {
          [path, state = state(), pose = pose_, melt = melt_surface()](const RunContext& context) -> Result<QString> {
              const Result<Mesh> mesh = melt ? Result<Mesh>(*melt) : posed_mesh(state, pose, context);
              if (!mesh) return mesh.error();
-             return write_told(*mesh, path, context, state.source ? state.source->path : "");
+             const bool is_whole = !melt && state.level() == state.model->finest_level();
+             return write_told(is_whole ? with_softness(*mesh, state) : *mesh, path, context,
+                               state.source ? state.source->path : "");
          });
 }
 

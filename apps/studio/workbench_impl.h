@@ -36,6 +36,7 @@ struct Workbench::Impl {
     PieceOptions piece_options;
     GlbSettings glb_settings;
     FitSettings fit_settings;
+    FleshSettings flesh_settings;
     /// The animation's mesh in the frame that is shown, made when it is first asked for.
     struct {
         std::shared_ptr<const MovingMesh> of;

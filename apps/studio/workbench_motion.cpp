@@ -2,6 +2,7 @@
 #include "workbench_impl.h"
 
 #include "fitting.h"
+#include "fleshing.h"
 #include "motion_file.h"
 #include "words.h"
 
@@ -18,7 +19,7 @@ void Workbench::set_fit_settings(const FitSettings& settings) {
     const MovingMesh& original = *state().recording->original;
     if (is_another_rate && original.frames_per_second != settings.frames_per_second)
         open_motion(original.path, original.clip);
-    else if (state().recording->fitted || jobs_.is_pending(kFitTopic))
+    else if (!is_another_rate && (state().recording->fitted || jobs_.is_pending(kFitTopic)))
         fit(); // the newest error replaces the one in progress
 }
 
@@ -79,12 +80,13 @@ void Workbench::open_motion(const std::string& path, std::size_t clip) {
                 opened.state.recording = std::move(*recording);
                 return opened;
             }
+            const Error still = {ErrorCode::unsuitable, "has no animation: open an animated glTF (.glb, .gltf), a "
+                                                        "point cache (.pc2, .mdd), or one of several numbered meshes."};
+            if (!is_numbered(path) && !is_gltf_file(path)) return about(still);
             Result<State> state =
                 is_numbered(path) ? numbered_state(path, rate, context) : gltf_state(path, clip, rate, context);
             if (!state) return about(state.error());
-            if (!state->recording)
-                return about({ErrorCode::unsuitable, "has no animation: open an animated glTF (.glb, .gltf), a point "
-                                                     "cache (.pc2, .mdd), or one of several numbered meshes."});
+            if (!state->recording) return about(still);
             state->body = now.body;
             opened.state = std::move(*state);
             opened.warnings = opened.state.source->warnings;
@@ -114,17 +116,57 @@ void Workbench::open_motion(const std::string& path, std::size_t clip) {
         });
 }
 
+bool Workbench::can_fit() const {
+    const auto& recording = state().recording;
+    return recording && recording->original && !(recording->fitted && recording->fitted->flesh);
+}
+
+bool Workbench::can_make_flesh() const {
+    const auto& recording = state().recording;
+    return recording && recording->original && !recording->original->joints.empty();
+}
+
+const FleshSettings& Workbench::flesh_settings() const { return impl_->flesh_settings; }
+
+void Workbench::set_flesh_settings(const FleshSettings& settings) {
+    if (settings == impl_->flesh_settings) return;
+    impl_->flesh_settings = settings;
+    Q_EMIT flesh_settings_changed();
+}
+
 void Workbench::fit() {
     if (!can_fit()) return Q_EMIT told("There is no animation to follow.", true, "fit.open");
-    if (is_refused(kOpenTopic, "A file is being opened: fit once it is there, or cancel.")) return;
-    jobs_.start<State>(
-        "Fitting", kFitTopic,
-        [state = state(), error = impl_->fit_settings.error](const RunContext& context) {
-            return fitted_state(state, error, context);
+    change_motion(
+        "Fitting", "Fit",
+        [error = impl_->fit_settings.error](State state, const RunContext& context) {
+            return fitted_state(std::move(state), error, context);
         },
-        [this, original = state().recording->original, key = document_.merge_key("fit")](const State& made) {
-            if (!can_fit() || state().recording->original != original) return;
+        fit_summary);
+}
+
+void Workbench::make_flesh() {
+    if (!can_make_flesh()) return Q_EMIT told("There is no skin with joints to make flesh of.", true, "fit.open");
+    change_motion(
+        "Making flesh", "Make flesh",
+        [settings = impl_->flesh_settings](State state, const RunContext& context) {
+            return fleshed_state(std::move(state), settings, context);
+        },
+        flesh_summary);
+}
+
+/// A driver and its poses in place of the recording there is, in the background.
+void Workbench::change_motion(const QString& title, const QString& name,
+                              std::function<Result<State>(State, const RunContext&)> make,
+                              std::function<QString(const Recording&)> summary) {
+    if (is_refused(kOpenTopic, "A file is being opened: go on once it is there, or cancel.")) return;
+    pause();
+    jobs_.start<State>(
+        title, kFitTopic,
+        [state = state(), make = std::move(make)](const RunContext& context) { return make(state, context); },
+        [this, name, recording = state().recording, summary = std::move(summary)](const State& made) {
+            if (state().recording != recording) return; // of another animation
             State next = state();
+            next.source = made.source;
             next.model = made.model;
             next.strip = made.strip;
             next.restore.level = made.model->finest_level();
@@ -133,18 +175,19 @@ void Workbench::fit() {
             next.pose_from_file = false;
             next.recording = made.recording;
             const std::size_t frame = frame_;
-            document_.change("Fit", std::move(next), key);
+            document_.change(name, std::move(next));
             view_.edit([](ViewSettings& settings) { settings.original = false; });
             frame_ = std::min(frame, frame_count() - 1);
             set_mode(Mode::body);
             show_pose();
             Q_EMIT timeline_changed();
-            Q_EMIT told(fit_summary(*state().recording), false);
+            Q_EMIT told(summary(*state().recording), false);
         });
 }
 
 void Workbench::save_packed(const std::string& path) {
-    if (!can_fit() || !state().recording->fitted) return Q_EMIT told("Nothing is fitted yet.", true, "fit.make");
+    if (!state().recording || !state().recording->fitted)
+        return Q_EMIT told("Nothing is fitted yet.", true, "fit.make");
     save("Saving " + file_name(path), path,
          [path, fitted = state().recording->fitted](const RunContext&) -> Result<QString> {
              if (const Status written = write_file(path_of(path), fitted->packed); !written) return written.error();

@@ -324,7 +324,7 @@ TEST_F(Panels, NothingIsCutOff) {
     settings.coloring = &kErrorColors;
     workbench().view().set(settings);
     choose("body.preset", 8); // wax: all of its rows
-    for (const char* panel : {"model", "quads", "detail", "deform", "body", "fracture", "fit", "view"}) {
+    for (const char* panel : {"model", "quads", "detail", "deform", "body", "fracture", "fit", "flesh", "view"}) {
         ASSERT_TRUE(window->show_panel(panel));
         for (int k = 0; k < 5; ++k) QCoreApplication::processEvents();
         const auto& area = get<QScrollArea>(panel);
@@ -352,7 +352,7 @@ TEST_F(Panels, NothingIsCutOff) {
 }
 
 TEST_F(Panels, TheColumnShowsWhatTheScriptNames) {
-    for (const char* panel : {"model", "quads", "detail", "deform", "body", "fracture", "fit", "view"}) {
+    for (const char* panel : {"model", "quads", "detail", "deform", "body", "fracture", "fit", "flesh", "view"}) {
         EXPECT_TRUE(window->show_panel(panel));
         EXPECT_EQ(window->panel(), panel);
         EXPECT_TRUE(get<QScrollArea>(panel).isVisible());
@@ -361,5 +361,5 @@ TEST_F(Panels, TheColumnShowsWhatTheScriptNames) {
     EXPECT_EQ(window->panel(), "view");
     auto& tabs = get<QTabBar>("panels");
     QTest::keyClick(&tabs, Qt::Key_Left);
-    EXPECT_EQ(window->panel(), "fracture");
+    EXPECT_EQ(window->panel(), "flesh");
 }

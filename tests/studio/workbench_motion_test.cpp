@@ -1,9 +1,12 @@
 // Animations of other programs: opened, played, fitted, compared and saved.
 #include "coloring.h"
+#include "flesh/skinned_gltf.h"
 #include "workbench_fixture.h"
 
 #include "filigree/file.h"
 #include "filigree/fit.h"
+#include "filigree/io/system/file.h"
+#include "filigree/skin.h"
 
 #include <cmath>
 #include <filesystem>
@@ -190,6 +193,56 @@ TEST_F(Motion, WhatDoesNotMoveTheMeshIsRefused) {
     bench.jobs().cancel();
     bench.wait_until_idle();
     EXPECT_TRUE(state() == moving);
+}
+
+TEST_F(Motion, ASkinBecomesFleshBesideItself) {
+    ASSERT_TRUE(write_file(path("tube.gltf"), filigree_test::skinned_tube()));
+    bench.open(path("tube.gltf"));
+    bench.wait_until_idle();
+    ASSERT_TRUE(errors.empty()) << errors[0];
+    EXPECT_NE(notes.back().find("Flesh makes it soft"), std::string::npos) << notes.back();
+    ASSERT_TRUE(bench.can_make_flesh());
+    EXPECT_EQ(state().recording->original->joints, (std::vector<std::string>{"upper", "lower"}));
+    FleshSettings settings;
+    settings.particles = 300;
+    settings.joints = 40;
+    settings.soft = {"lower"};
+    bench.set_flesh_settings(settings);
+    bench.make_flesh();
+    bench.wait_until_idle();
+    ASSERT_TRUE(errors.empty()) << errors[0];
+    ASSERT_TRUE(state().recording->fitted && state().recording->fitted->flesh);
+    const FleshedMotion& flesh = *state().recording->fitted->flesh;
+    EXPECT_TRUE(flesh.is_sound);
+    EXPECT_GT(flesh.measure.furthest, 0);
+    EXPECT_FALSE(bench.can_fit()) << "its original is the skin";
+    EXPECT_EQ(bench.frame_count(), state().recording->original->frames.size());
+    // The original is plain skinning, and the distance from it is what colours show.
+    const SkinnedMesh skin = read_skin(path("tube.gltf")).value();
+    std::vector<Eigen::Affine3d> transforms(skin.joints.size());
+    std::vector<Vec3f> skinned(skin.mesh.vertex_count());
+    const std::size_t last = bench.frame_count() - 1;
+    skin.transforms(0, double(last) / bench.frames_per_second(), transforms);
+    skin_positions(skin, transforms, skinned);
+    EXPECT_EQ(state().recording->original->frames[last], skinned);
+    bench.go_to_frame(last);
+    bench.measure_error();
+    bench.wait_until_idle();
+    ASSERT_TRUE(bench.error());
+    EXPECT_GT(bench.error()->max, 0);
+    bench.export_animation(path("soft.glb"));
+    bench.wait_until_idle();
+    EXPECT_TRUE(errors.empty()) << errors[0];
+    EXPECT_TRUE(fs::exists(path("soft.glb")));
+    undo_stack().undo();
+    EXPECT_TRUE(bench.can_fit());
+    settings.soft = {"tail"};
+    bench.set_flesh_settings(settings);
+    bench.make_flesh();
+    bench.wait_until_idle();
+    ASSERT_EQ(errors.size(), 1u);
+    EXPECT_NE(errors[0].find("tail"), std::string::npos) << errors[0];
+    bench.set_flesh_settings({});
 }
 
 } // namespace

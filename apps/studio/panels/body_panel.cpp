@@ -3,6 +3,7 @@
 #include "actions.h"
 #include "panel.h"
 #include "pieces.h"
+#include "softness.h"
 
 #include "filigree/physics/material.h"
 #include "filigree/scene/scene_keys.h"
@@ -91,7 +92,7 @@ bool melts(const Body& body) { return is_of_mpm(body) && body.material.melts(); 
 class BodyPanel : public Panel {
 public:
     BodyPanel(Workbench& workbench, const Actions& actions) : Panel("body", workbench) {
-        add_material();
+        add_material(actions);
         add_motion(actions);
         add_world();
         add_advanced();
@@ -110,7 +111,7 @@ private:
                 }};
     }
 
-    void add_material() {
+    void add_material(const Actions& actions) {
         QGridLayout* rows = section("Material");
         const auto settings = body();
         QStringList names;
@@ -147,6 +148,15 @@ private:
         number(rows,
                settings.setting("body.size", "Size", "The longest side of the mesh, metres", drop_field(&Body::size)),
                {.least = 0.01, .most = 100, .decimals = 2, .unit = "m", .logarithmic = true});
+        const auto is_painted = [this](const Body&) { return softness_of(state()) != nullptr; };
+        number(rows,
+               settings.setting("body.softest", "Painted",
+                                "Stiffness where softness is painted, as a multiple of the material's; above 1 it is "
+                                "stiffer there",
+                                field(&Body::softest), is_painted),
+               {.least = 0.01, .most = 100, .decimals = 2, .unit = "×", .logarithmic = true, .neutral = 0.1});
+        beside(rows, {new ActionButton("body.soften", actions.find("tool.soften"), "Paint softness", page()),
+                      new ActionButton("body.unpaint", actions.find("body.clear_softness"), {}, page())});
     }
 
     void add_motion(const Actions& actions) {

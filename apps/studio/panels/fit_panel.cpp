@@ -75,7 +75,7 @@ private:
     std::shared_ptr<const MovingMesh> original() const {
         return state().recording ? state().recording->original : nullptr;
     }
-    bool is_fitted() const { return original() && state().recording->fitted; }
+    bool is_fitted() const { return original() && state().recording->fitted && !state().recording->fitted->flesh; }
 
     void refresh() override {
         const auto of = original();

@@ -18,7 +18,8 @@ class Viewport;
 class Workbench;
 
 /// The panels' names, in the order of their tabs.
-inline constexpr std::array kPanels = {"model", "quads", "detail", "deform", "body", "fracture", "fit", "view"};
+inline constexpr std::array kPanels = {"model",    "quads", "detail", "deform", "body",
+                                       "fracture", "fit",   "flesh",  "view"};
 
 /// The mesh: where it came from, what it is, what is wrong with it, where to save it.
 QWidget* make_model_panel(Workbench& workbench, const Actions& actions, QMenu* recent_files);
@@ -34,6 +35,8 @@ QWidget* make_body_panel(Workbench& workbench, const Actions& actions);
 QWidget* make_fracture_panel(Workbench& workbench, const Actions& actions);
 /// Animations of other programs: how closely a driver is to follow, and what that comes to.
 QWidget* make_fit_panel(Workbench& workbench, const Actions& actions);
+/// A character that joints move as soft matter.
+QWidget* make_flesh_panel(Workbench& workbench, const Actions& actions);
 /// How the mesh is shown.
 QWidget* make_view_panel(Workbench& workbench, Viewport& viewport, MainWindow& window);
 

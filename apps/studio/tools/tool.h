@@ -102,8 +102,8 @@ std::unique_ptr<Tool> make_tool(const ToolContext& context) {
     return std::make_unique<T>(context);
 }
 
-extern const ToolEntry kPullTool, kPinTool, kTurnTool, kTorchTool;
-inline constexpr std::array kTools = {&kPullTool, &kPinTool, &kTurnTool, &kTorchTool};
+extern const ToolEntry kPullTool, kPinTool, kTurnTool, kTorchTool, kSoftenTool;
+inline constexpr std::array kTools = {&kPullTool, &kPinTool, &kTurnTool, &kTorchTool, &kSoftenTool};
 
 /// The knobs of the deformations: no tool of the table, but there with some of them.
 std::unique_ptr<Tool> make_gizmo(const ToolContext& context);
