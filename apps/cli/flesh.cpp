@@ -1,9 +1,12 @@
 #include "animation_output.h"
 #include "commands.h"
+#include "moving_input.h"
 
 #include "filigree/fit.h"
 #include "filigree/flesh.h"
 #include "filigree/io/system/extension.h"
+#include "filigree/io/system/numbered_name.h"
+#include "filigree/mesh/mesh_map.h"
 #include "filigree/mesh/weld.h"
 
 #include <algorithm>
@@ -29,8 +32,12 @@ constexpr std::size_t kOverlapFrames = 4;
 constexpr std::size_t kFewestPlaces = 12; // FitOptions::base
 
 struct FleshArguments {
-    std::string input;
-    std::vector<std::string> outputs, clips, soft;
+    std::string input, mesh;
+    std::vector<std::string> outputs, clips, soft, through;
+    std::string soft_from;
+    std::vector<double> soft_values;
+    std::optional<double> input_rate;
+    bool by_surface = false, keep_skeleton = false;
     double strength = SoftJoints{}.strength;
     FleshOptions flesh;
     FleshClipOptions clip;
@@ -51,8 +58,17 @@ void check_outputs(const FleshArguments& options, const Session& session) {
             check_folder_of(path);
         else
             check_animation_path(path);
-        check_not_input(path, {options.input});
+        check_not_input(path, {options.input, options.mesh});
     }
+    if (options.keep_skeleton && std::ranges::none_of(options.outputs, is_glb))
+        refuse("--keep-skeleton is for a .glb; give one with -o NAME.glb.");
+    if (const std::string extension = lower_extension(path_of(options.input));
+        options.keep_skeleton && extension != ".glb" && extension != ".gltf")
+        refuse("--keep-skeleton: " + options.input + " is no glTF and has no skeleton.");
+    if (!options.soft_values.empty() && options.soft_from.empty())
+        refuse("--soft-values belongs to --soft-from, which names the numbers.");
+    if (options.soft_values.size() == 2 && options.soft_values[0] == options.soft_values[1])
+        refuse("--soft-values: the two numbers are the same.");
     check_animation_options(options.outputs, session);
     if (options.animation.glb == GlbMotion::morph)
         refuse("--as morph is for meshes; flesh leaves as a skin. Write a .fil and export that.");
@@ -140,7 +156,7 @@ public:
 private:
     Flesh make_flesh() {
         check_outputs(options_, session_);
-        SkinnedMesh skin = require(read_skin(options_.input, session_.context()));
+        SkinnedMesh skin = read_input();
         session_.warn(skin.warnings);
         clip_numbers_ = chosen_clips(options_, skin, session_);
         for (const std::string& path : options_.outputs)
@@ -150,10 +166,46 @@ private:
         FleshOptions options = options_.flesh;
         options.sculpted_gravity = !options_.sags;
         for (const std::string& pattern : options_.soft) options.soft.push_back({pattern, options_.strength});
+        for (const std::string& pair : options_.through) {
+            const std::size_t comma = pair.find(',');
+            if (comma == 0 || comma == std::string::npos || comma + 1 == pair.size())
+                refuse("--through takes two joints with a comma between them, such as \"*Hand,Spine*\".");
+            options.contacts.push_back({pair.substr(0, comma), pair.substr(comma + 1)});
+        }
+        if (!options_.soft_from.empty()) {
+            const std::vector<double>& ends = options_.soft_values;
+            const Result<std::vector<float>> numbers = mesh_map(skin.mesh, options_.soft_from);
+            if (!numbers) throw Failure{{numbers.error().code, options_.input + ": " + numbers.error().message}};
+            options.loose =
+                in_range(*numbers, ends.empty() ? std::array{0.0, 1.0} : std::array{ends[0], ends[1]}, {0, 1});
+            options.loose_strength = options_.strength;
+        }
         Result<Flesh> made = Flesh::create(std::move(skin), options, clip_numbers_, session_.context());
         if (!made) throw Failure{{made.error().code, options_.input + ": " + made.error().message}};
         session_.warn(made->report().warnings);
         return std::move(*made);
+    }
+
+    SkinnedMesh read_input() {
+        CharacterOptions character;
+        character.by_joints = !options_.by_surface;
+        character.frames_per_second = options_.input_rate;
+        Mesh rest;
+        if (!options_.mesh.empty()) {
+            rest = session_.read_mesh(options_.mesh);
+            character.rest = &rest;
+        }
+        std::error_code ignored;
+        const bool has_meshes =
+            numbered_name(path_of(options_.input)).has_value() || fs::is_directory(path_of(options_.input), ignored);
+        if (options_.mesh.empty() && has_meshes) {
+            rest = first_mesh(options_.input, session_);
+            character.rest = &rest;
+        }
+        const std::string extension = lower_extension(path_of(options_.input));
+        if (!character.rest && (extension == ".pc2" || extension == ".mdd" || extension == ".usda"))
+            refuse(options_.input + ": has positions alone; --mesh FILE gives the mesh that it moves.");
+        return require(read_character(path_of(options_.input), character, session_.context()));
     }
 
     FleshClipOptions clip_options() const {
@@ -231,7 +283,8 @@ private:
             SkinOptions skin = options_.animation.skin;
             skin.normals = options_.animation.no_normals ? ExportNormals::leave : ExportNormals::keep;
             skin.compress = options_.animation.compress;
-            skin.materials_beside = options_.input;
+            skin.materials_beside = path_of(options_.mesh.empty() ? options_.input : options_.mesh);
+            if (options_.keep_skeleton) skin.skeleton_of = path_of(options_.input);
             if (!skin.key_rate) skin.key_rate = kDefaultKeyRate;
             session_.begin_writing(path);
             const ExportReport written = require(write_skin_glb(fitted_.model, named, skin, path, session_.context()));
@@ -378,7 +431,17 @@ Command flesh_command() {
         .text = "Make soft matter of a character that joints move, and write it as a skin again",
         .options =
             OptionList{
-                Option("character", options->input, "Animated glTF with a skin (.glb, .gltf)").is_read().required(),
+                Option("character", options->input,
+                       "Animated glTF (.glb, .gltf), by its skin or its morph targets; a model with poses (.fil); with "
+                       "--mesh also .pc2, .mdd, .usda or numbered meshes")
+                    .is_read()
+                    .required(),
+                Option("--mesh", options->mesh, "The mesh at rest, for an input that has positions alone").is_read(),
+                Option("--by-surface", options->by_surface,
+                       "Follow the surface of a skin, with its morph targets, and not its joints"),
+                Option("--input-rate", options->input_rate,
+                       "Frames a second of an input that does not say it (default: 60)")
+                    .above_zero(),
                 Option("-o,--output", options->outputs,
                        "Output: a skin with all clips (.glb), or one clip as a model (.fil), .pc2, .mdd, .usda or a "
                        "folder of meshes (NAME/). May come several times")
@@ -394,9 +457,21 @@ Command flesh_command() {
                        "Joints that hold little, with all below them, such as \"Tail*\". May come several times")
                     .one_at_a_time()
                     .named("PATTERN"),
-                Option("--strength", options->strength, "How strong the joints of --soft hold, of 1")
+                Option("--soft-from", options->soft_from,
+                       "Numbers of the mesh's vertices that say how loose it is: color.r (g, b, a), \"scalar NAME\", "
+                       "\"group NAME\", \"object NAME\" or \"material NAME\"")
+                    .named("NUMBERS"),
+                Option("--soft-values", options->soft_values,
+                       "Two of these numbers: where it holds as ever, and where it is loose (default: 0 1)")
+                    .values(2),
+                Option("--strength", options->strength, "How strong the joints of --soft hold, and loose places, of 1")
                     .between(0.0, 1.0)
                     .with_default(),
+                Option("--through", options->through,
+                       "Two joints whose limbs pass through each other, with all below them, such as "
+                       "\"*Hand,Spine*\". May come several times")
+                    .one_at_a_time()
+                    .named("PAIR"),
                 Option("--ground", options->clip.ground, "A floor at the lowest point of each clip"),
                 Option("--joints", options->joints, "Joints of the output, about").whole_from(12).with_default(),
                 Option("--stiffness", options->flesh.material.young_modulus, "Young's modulus of the flesh, Pa")
@@ -428,13 +503,19 @@ Command flesh_command() {
                     .above_zero()
                     .with_default(),
                 Option("--sags", options->sags, "Gravity bends the bind pose too (default: it is sculpted in)"),
+                Option("--separate", options->flesh.separate,
+                       "Part what is nearer to each other than two particles, such as fingers; takes longer"),
+                Option(
+                    "--keep-skeleton", options->keep_skeleton,
+                    "Keep the file's own joints, nodes and cameras beside the new joints, moving as they did (.glb)"),
                 Option("--no-self-contact", options->no_self_contact, "Parts of the body pass through each other"),
                 Option("--no-check", options->no_check, "Do not look for overlaps, which takes seconds")} +
             animation_options(options->animation),
         .examples = "  filigree flesh fox.glb -o soft.glb\n"
                     "  filigree flesh fox.glb -o soft.glb --loop --soft \"b_Tail*\"\n"
                     "  filigree flesh walk.glb -o soft.glb --clip Walk --stiffness 8000 --ground\n"
-                    "  filigree flesh walk.glb -o soft.fil --clip Walk --joints 1000",
+                    "  filigree flesh walk.glb -o soft.fil --clip Walk --joints 1000\n"
+                    "  filigree flesh flag.pc2 --mesh flag.obj -o soft.glb --soft-from color.r",
         .run = [options](Session& session) { FleshCommand(*options, session).run(); }};
 }
 

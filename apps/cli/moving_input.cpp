@@ -15,19 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The first mesh of a sequence, for its faces.
-Mesh first_mesh(const std::string& path, Session& session) {
-    const std::vector<fs::path> files = animation_files(path_of(path));
-    if (files.empty()) refuse(ErrorCode::not_found, path + ": has no meshes.");
-    std::vector<std::pair<std::uint64_t, fs::path>> numbered;
-    for (const fs::path& file : files) {
-        const std::string stem = file.stem().string();
-        const std::size_t digits = stem.find_last_not_of("0123456789") + 1;
-        if (digits < stem.size()) numbered.emplace_back(std::stoull(stem.substr(digits).substr(0, 18)), file);
-    }
-    return session.read_mesh((numbered.empty() ? files.front() : std::ranges::min(numbered).second).string());
-}
-
 /// A model's restored mesh as its own poses move it.
 void open_model_animation(const MovingFiles& files, Session& session, MovingInput& input) {
     input.model = session.read_model(files.input, &input.poses);
@@ -42,6 +29,18 @@ void open_model_animation(const MovingFiles& files, Session& session, MovingInpu
 }
 
 } // namespace
+
+Mesh first_mesh(const std::string& path, Session& session) {
+    const std::vector<fs::path> files = animation_files(path_of(path));
+    if (files.empty()) refuse(ErrorCode::not_found, path + ": has no meshes.");
+    std::vector<std::pair<std::uint64_t, fs::path>> numbered;
+    for (const fs::path& file : files) {
+        const std::string stem = file.stem().string();
+        const std::size_t digits = stem.find_last_not_of("0123456789") + 1;
+        if (digits < stem.size()) numbered.emplace_back(std::stoull(stem.substr(digits).substr(0, 18)), file);
+    }
+    return session.read_mesh((numbered.empty() ? files.front() : std::ranges::min(numbered).second).string());
+}
 
 void open_moving_input(const MovingFiles& files, Session& session, MovingInput& input) {
     const std::string extension = lower_extension(path_of(files.input));

@@ -31,6 +31,9 @@ struct MovingInput {
     bool needs_rest = false; ///< no mesh at rest was given: a frame stands for it
 };
 
+/// The first mesh of a sequence, for its faces.
+Mesh first_mesh(const std::string& path, Session& session);
+
 /// Throws a Failure where nothing moves: .pc2, .mdd, numbered meshes, an animated glTF or a model with poses do.
 void open_moving_input(const MovingFiles& files, Session& session, MovingInput& input);
 

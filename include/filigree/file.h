@@ -267,6 +267,9 @@ struct SkinOptions {
     bool all_levels = false;     ///< coarser levels too, as MSFT_lod, on the same joints
     ExportNormals normals = ExportNormals::keep;
     std::filesystem::path materials_beside = {}; ///< path of the mesh or model: libraries are looked for beside it
+    /// Path of a glTF whose nodes, without their meshes, and cameras are put beside the skin, with what its animations
+    /// of the same names do to them: sockets and programs that ask for its joints go on. Empty: none.
+    std::filesystem::path skeleton_of = {};
 };
 
 /// Writes a model's animation as a plain glTF 2.0 skin (docs/exchange.md), without extensions; the mesh is at rest

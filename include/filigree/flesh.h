@@ -23,10 +23,19 @@ namespace filigree {
 /// Soft tissue, chosen for how it moves: 1,000 kg/m^3, 15 kPa, Poisson's ratio 0.47. Damping is FleshOptions::damping.
 Material flesh_material();
 
-/// Joints that hold less than others, with all joints below them.
+/// Joints that hold otherwise than the rest, with all joints below them.
 struct SoftJoints {
     std::string pattern;    ///< name of a joint; * stands for any characters, ? for one
     double strength = 0.02; ///< 0 .. 1: factor of the springs' stiffness; below 0.75 nothing is held fast
+    /// As those of FleshOptions, which count where these are unset.
+    std::optional<double> core = {}, frequency = {}, surface_frequency = {}, damping = {};
+};
+
+/// Whether limbs touch each other: what the joints of one pattern carry, with all joints below them, and those of
+/// another.
+struct JointContact {
+    std::string first, second; ///< names or patterns, as SoftJoints::pattern
+    bool touch = false;
 };
 
 struct FleshOptions {
@@ -35,16 +44,56 @@ struct FleshOptions {
     Material material = flesh_material();
     /// 0 .. 1: how far the held core reaches from a bone to the skin. 0: nothing is held, 1: all is.
     double core = 0.5;
-    double frequency = 10;            ///< Hz, 0 or more: of the springs at the edge of the core
-    double surface_frequency = 1;     ///< Hz, 0 or more: of the springs at the skin
-    double damping = 3;               ///< 1/s, 0 or more: against the animation
-    std::optional<double> leash = {}; ///< m, above 0: Follow::leash; unset: two spacings
-    double most_acceleration = 100;   ///< m/s^2, above 0: Follow::most_acceleration
-    std::vector<SoftJoints> soft;     ///< the first pattern that fits counts
-    Vec3d gravity = {0, -9.81, 0};    ///< m/s^2
+    double frequency = 10;              ///< Hz, 0 or more: of the springs at the edge of the core
+    double surface_frequency = 1;       ///< Hz, 0 or more: of the springs at the skin
+    double damping = 3;                 ///< 1/s, 0 or more: against the animation
+    std::optional<double> leash = {};   ///< m, above 0: Follow::leash; unset: two spacings
+    double most_acceleration = 100;     ///< m/s^2, above 0: Follow::most_acceleration
+    std::vector<SoftJoints> soft;       ///< the first pattern that fits counts
+    std::vector<JointContact> contacts; ///< the last that fits two joints counts; without one they touch
+    /// One a vertex, 0 .. 1, or empty: how loose the matter there is. 0 holds as the joints say, 1 with loose_strength
+    /// of it; carried inwards harmonically.
+    std::vector<float> loose;
+    double loose_strength = 0.02;    ///< 0 .. 1
+    std::optional<double> spacing;   ///< m, above 0: of the particles, in place of their number
+    std::vector<VertexField> fields; ///< BodyOptions::fields
+    bool separate = false;           ///< BodyOptions::separate
+    Vec3d gravity = {0, -9.81, 0};   ///< m/s^2
     /// Whether the mesh has its shape under gravity: in the bind pose nothing sags.
     bool sculpted_gravity = true;
 };
+
+/// A mesh that moves without joints: a point cache, morph targets, anything.
+struct MovingSurface {
+    Mesh rest;
+    std::vector<SkinClip> clips;
+    /// Where a clip has the vertices, one each, relative to the mesh's origin. seconds: from the clip's start.
+    std::function<Status(std::size_t clip, double seconds, std::span<Vec3f> positions)> positions;
+    double samples_per_second = 60; ///< above 0: how often the joints are worked out; cubic in between
+};
+
+/// A moving surface as a skin: patches of it become joints, which move and stretch as the surface does. Matter is then
+/// soft by its depth, as there are no bones. patches: about, 12 or more; no more than a quarter of the mesh's vertices
+/// (64 where it is smaller than that). Cost O(V) for each sample. Memory: the mesh, and 12 numbers a patch and sample.
+/// Errors: usage (check_mesh refuses the mesh; no clip; a number out of range), unsuitable (no faces; fewer than 12
+/// places; positions that are not finite), cancelled, and those of `positions`.
+Result<SkinnedMesh> skin_of_surface(MovingSurface surface, std::size_t patches = 400,
+                                    const RunContext& context = RunContext());
+
+struct CharacterOptions {
+    /// The mesh at rest, for files that have positions alone: point caches, numbered meshes. Vertices of glTF and of
+    /// numbered meshes are matched to it by their places.
+    const Mesh* rest = nullptr;
+    bool by_joints = true; ///< false: skins are taken as moving surfaces too, so that their morph targets move as well
+    std::optional<double> frames_per_second = {}; ///< of files that do not say it; unset: 60
+    std::size_t patches = 400;                    ///< of skin_of_surface
+};
+
+/// Reads any file that moves as a skin: an animated glTF by its joints (read_skin), or by its surface where it has no
+/// skin; a model with poses (.fil); with `rest` all that open_animation reads. Errors: those of read_skin,
+/// skin_of_surface, open_animation and read_model; unsuitable (nothing moves; positions alone, and no mesh at rest).
+Result<SkinnedMesh> read_character(const std::filesystem::path& path, const CharacterOptions& options = {},
+                                   const RunContext& context = RunContext());
 
 /// Metres a model unit: the power of ten that makes a character between 0.3 m and 3 m tall; 1 where it already is
 /// between 0.1 m and 10 m. size: longest side of its box, model units.
@@ -81,7 +130,7 @@ public:
     const FleshOptions& options() const { return options_; }
     double scale() const { return options_.scale; } ///< metres a model unit
     const std::shared_ptr<const Body>& body() const { return body_; }
-    const Follow& follow() const { return follow_; }
+    const Follow& follow() const { return follow_; } ///< with FleshOptions::contacts
     const FleshReport& report() const { return report_; }
     /// Of each particle: 0 on a bone, 1 at the skin.
     std::span<const float> softness() const { return softness_; }
@@ -107,7 +156,7 @@ private:
     FleshReport report_;
     std::vector<float> softness_;
     std::vector<FleshWeights> weights_;
-    std::vector<std::uint8_t> linear_; ///< of each particle: 1 where joints are scaled
+    std::vector<std::uint8_t> linear_; ///< of each particle: 1 where joints are scaled, or are patches
     std::vector<std::uint8_t> left_out_;
     Mesh surface_;
 };

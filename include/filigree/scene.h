@@ -9,6 +9,7 @@
 #pragma once
 
 #include "filigree/context.h"
+#include "filigree/flesh.h"
 #include "filigree/fracture.h"
 #include "filigree/mesh.h"
 #include "filigree/physics/simulation.h"
@@ -139,6 +140,34 @@ struct SceneForce {
     Keyed<Vec3d> newtons{{}, {}, Vec3d::Zero()};
 };
 
+/// How joints of a [[follow]] hold, with all joints below them.
+struct SceneFollowJoint {
+    SoftJoints soft; ///< its pattern is `name`
+};
+
+/// Whether limbs of a [[follow]] touch each other.
+struct SceneFollowContact {
+    JointContact limbs;
+};
+
+/// A body that becomes the flesh of an animated character.
+struct SceneFollow {
+    unsigned line = 0;
+    std::string named;
+    std::size_t body = 0;
+    std::string animation; ///< path; "": the body's own mesh
+    std::string clip;      ///< "": the first that moves
+    double speed = 1;
+    double start = 0;        ///< s of the clip, at the start of the scene
+    bool repeat = false;     ///< the clip begins again at its end
+    bool is_sculpted = true; ///< FleshOptions::sculpted_gravity
+    FleshOptions flesh;      ///< the springs; without what the body says
+    std::string loose_from;  ///< as SceneMap::from; "": nothing
+    std::array<double, 2> loose_values = {0, 1};
+    std::vector<SceneFollowJoint> joints;
+    std::vector<SceneFollowContact> contacts;
+};
+
 struct SceneHand {
     unsigned line = 0;
     std::string named;
@@ -180,6 +209,7 @@ struct SceneFile {
     std::vector<ScenePin> pins;
     std::vector<SceneForce> forces;
     std::vector<SceneHand> hands;
+    std::vector<SceneFollow> follows;
     ScenePicture picture;
 };
 

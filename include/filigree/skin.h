@@ -48,6 +48,11 @@ struct SkinnedMesh {
     /// seconds: from the clip's start; held at its ends. Called from several threads.
     std::function<void(std::size_t clip, double seconds, std::span<Eigen::Affine3d> transforms)> transforms;
     std::vector<std::string> warnings; ///< sentences: what is left out
+    /// Whether joints are bones. Else they are patches of a surface that moves by itself (skin_of_surface, flesh.h).
+    bool has_bones = true;
+    /// Where a clip has the vertices, one each, relative to the mesh's origin, if the joints only come near to it.
+    /// Null: skin_positions says it.
+    std::function<Status(std::size_t clip, double seconds, std::span<Vec3f> positions)> surface = {};
 };
 
 /// Reads an animated glTF. Vertices are those of read_mesh, in its order. Skins that share joints become one. Meshes
@@ -55,10 +60,18 @@ struct SkinnedMesh {
 /// unsuitable (no skin; no animation; joints of scale zero).
 Result<SkinnedMesh> read_skin(const std::filesystem::path& path, const RunContext& context = RunContext());
 
+/// Where a clip has the vertices, relative to the mesh's origin: SkinnedMesh::surface, or skin_positions. Errors: those
+/// of SkinnedMesh::surface.
+Status clip_positions(const SkinnedMesh& skin, std::size_t clip, double seconds, std::span<Vec3f> positions,
+                      const RunContext& context = RunContext());
+
 /// Linear blend skinning: where the vertices are, relative to the mesh's origin. transforms: one a joint. positions:
 /// one a vertex. Cost O(weights).
 void skin_positions(const SkinnedMesh& skin, std::span<const Eigen::Affine3d> transforms, std::span<Vec3f> positions,
                     const RunContext& context = RunContext());
+
+/// What the joints' transforms are together at a vertex.
+Eigen::Affine3d blended_transform(const SkinnedMesh& skin, std::span<const Eigen::Affine3d> transforms, Index vertex);
 
 /// Poses of a model's driver, with a name.
 struct NamedPoses {

@@ -2,7 +2,7 @@
 #include "threads.h"
 
 #include "filigree/file.h"
-#include "filigree/scene/mesh_map.h"
+#include "filigree/mesh/mesh_map.h"
 #include "filigree/scene/particles_near.h"
 #include "filigree/scene/saved_state.h"
 

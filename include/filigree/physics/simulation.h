@@ -17,6 +17,8 @@
 #include "filigree/physics/world.h"
 #include "filigree/types.h"
 
+#include <array>
+#include <cstdint>
 #include <limits>
 #include <optional>
 
@@ -88,6 +90,10 @@ struct Follow {
     double leash_frequency = 20; ///< Hz, 0 or more
     /// m/s^2, above 0: particles feel no more of their target's acceleration. The rest moves them with their target.
     double most_acceleration = 100;
+    /// Limbs that pass through each other: the group of each particle; and pairs of groups between which there is no
+    /// contact within the body. Empty: everything touches.
+    std::vector<std::uint16_t> groups = {};
+    std::vector<std::array<std::uint16_t, 2>> passing = {};
 };
 
 /// Velocities of targets, m/s, from their places in three frames of one size: the mean of the ways before and after,

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <string_view>
 
 namespace filigree {
@@ -121,30 +122,93 @@ private:
             if (clip >= skin().clips.size())
                 return usage("There is no clip " + std::to_string(clip) + "; the skin has " +
                              std::to_string(skin().clips.size()) + ".");
+        if (o.spacing && !(*o.spacing > 0 && std::isfinite(*o.spacing)))
+            return usage("The spacing of the particles must be above 0 m.");
+        if (!is_part(o.loose_strength)) return usage("The strength of loose matter must be between 0 and 1.");
+        if (!o.loose.empty() && o.loose.size() != skin().mesh.vertex_count())
+            return usage("There are " + std::to_string(o.loose.size()) + " numbers of how loose the matter is for " +
+                         std::to_string(skin().mesh.vertex_count()) + " vertices.");
+        if (!std::ranges::all_of(o.loose, [&](float x) { return is_part(double(x)); }))
+            return usage("How loose the matter is must be between 0 and 1 at each vertex.");
         if (o.scale == 0) o.scale = flesh_scale(bounds(skin().mesh).size().maxCoeff());
-        strengths_.assign(skin().joints.size(), 1);
+        return name_joints();
+    }
+
+    /// The number of the first pattern that a joint fits, or a joint above it; `patterns`: there is none.
+    template <class Patterns, class Pattern>
+    std::size_t first_fit(std::size_t joint, const Patterns& patterns, const Pattern& pattern) const {
+        Index at = Index(joint);
+        for (std::size_t steps = 0; at != kNoIndex && steps <= skin().joints.size(); ++steps) {
+            for (std::size_t p = 0; p < patterns.size(); ++p)
+                if (fits(skin().joints[at].name, pattern(patterns[p]))) return p;
+            at = skin().joints[at].parent;
+        }
+        return patterns.size();
+    }
+
+    Error no_joint_called(const std::string& pattern) const {
+        if (!skin().has_bones)
+            return usage("'" + pattern + "' should name joints, and this mesh moves without joints.");
+        std::vector<std::string> names;
+        for (const SkinJoint& joint : skin().joints) names.push_back(joint.name);
+        return usage("No joint is called '" + pattern + "'; there are " + list_of(names) + ".");
+    }
+
+    /// What the patterns say of each joint.
+    Status name_joints() {
+        const FleshOptions& o = flesh_.options_;
+        const std::size_t count = skin().joints.size();
+        soft_of_.resize(count);
         std::vector<std::uint8_t> met(o.soft.size());
-        for (std::size_t j = 0; j < strengths_.size(); ++j) {
-            Index at = Index(j);
-            for (std::size_t steps = 0; at != kNoIndex && steps <= strengths_.size(); ++steps) {
-                const auto found = std::ranges::find_if(
-                    o.soft, [&](const SoftJoints& soft) { return fits(skin().joints[at].name, soft.pattern); });
-                if (found != o.soft.end()) {
-                    strengths_[j] = float(found->strength);
-                    met[std::size_t(found - o.soft.begin())] = 1;
-                    flesh_.report_.soft.push_back(skin().joints[j].name);
-                    break;
-                }
-                at = skin().joints[at].parent;
-            }
+        for (std::size_t j = 0; j < count; ++j) {
+            soft_of_[j] =
+                first_fit(j, o.soft, [](const SoftJoints& soft) -> const std::string& { return soft.pattern; });
+            if (soft_of_[j] == o.soft.size() || !skin().has_bones) continue;
+            met[soft_of_[j]] = 1;
+            flesh_.report_.soft.push_back(skin().joints[j].name);
         }
+        const auto is_number = [](const std::optional<double>& x) { return !x || (*x >= 0 && std::isfinite(*x)); };
         for (std::size_t s = 0; s < o.soft.size(); ++s) {
-            if (!is_part(o.soft[s].strength)) return usage("The strength of a soft joint must be between 0 and 1.");
-            if (met[s]) continue;
-            std::vector<std::string> names;
-            for (const SkinJoint& joint : skin().joints) names.push_back(joint.name);
-            return usage("No joint is called '" + o.soft[s].pattern + "'; there are " + list_of(names) + ".");
+            const SoftJoints& soft = o.soft[s];
+            if (!(soft.strength >= 0 && soft.strength <= 1))
+                return usage("The strength of a soft joint must be between 0 and 1.");
+            if (!is_number(soft.core) || soft.core.value_or(0) > 1)
+                return usage("The core of a soft joint must be between 0 and 1.");
+            if (!is_number(soft.frequency) || !is_number(soft.surface_frequency) || !is_number(soft.damping))
+                return usage("The frequencies and the damping of a soft joint must be 0 or more.");
+            if (!met[s]) return no_joint_called(soft.pattern);
         }
+        return set_contacts();
+    }
+
+    /// Joints that fit the same patterns are one group of contact.
+    Status set_contacts() {
+        const std::vector<JointContact>& contacts = flesh_.options_.contacts;
+        std::map<std::vector<std::uint8_t>, std::uint16_t> numbers;
+        std::vector<std::vector<std::uint8_t>> groups; ///< whether it fits first and second of each contact
+        std::vector<std::uint8_t> met(2 * contacts.size());
+        for (std::size_t j = 0; j < skin().joints.size() && !contacts.empty(); ++j) {
+            std::vector<std::uint8_t> fits_them;
+            for (const JointContact& contact : contacts)
+                for (const std::string* name : {&contact.first, &contact.second})
+                    fits_them.push_back(skin().has_bones &&
+                                        first_fit(j, std::span(name, 1),
+                                                  [](const std::string& n) -> const std::string& { return n; }) == 0);
+            for (std::size_t k = 0; k < met.size(); ++k) met[k] |= fits_them[k];
+            const auto [known, is_new] = numbers.try_emplace(fits_them, std::uint16_t(groups.size()));
+            if (is_new) groups.push_back(fits_them);
+            group_of_.push_back(known->second);
+        }
+        for (std::size_t k = 0; k < met.size(); ++k)
+            if (!met[k]) return no_joint_called(k % 2 == 0 ? contacts[k / 2].first : contacts[k / 2].second);
+        for (std::uint16_t a = 0; a < groups.size(); ++a)
+            for (std::uint16_t b = 0; b <= a; ++b) {
+                bool touch = true;
+                for (std::size_t c = 0; c < contacts.size(); ++c)
+                    if ((groups[a][2 * c] && groups[b][2 * c + 1]) || (groups[b][2 * c] && groups[a][2 * c + 1]))
+                        touch = contacts[c].touch;
+                if (!touch) flesh_.follow_.passing.push_back({a, b});
+            }
         return Success{};
     }
 
@@ -159,6 +223,9 @@ private:
     /// Which joints change their size in the clips, and which are no motion that flesh can follow.
     void find_scales() {
         const std::size_t count = skin().joints.size();
+        is_scaled_.assign(count, 0);
+        is_odd_.assign(count, 0);
+        if (!skin().has_bones) return; // patches stretch as their surface does
         std::vector<double> least(count, 1), most(count, 1);
         std::vector<Eigen::Affine3d> transforms(count);
         for (const std::size_t clip : clips_) {
@@ -175,8 +242,6 @@ private:
         std::vector<double> carried(count);
         for (std::size_t i = 0; i < skin().weights.joints.size(); ++i)
             carried[skin().weights.joints[i]] += double(skin().weights.weights[i]);
-        is_scaled_.assign(count, 0);
-        is_odd_.assign(count, 0);
         for (std::size_t j = 0; j < count; ++j) {
             if (!(carried[j] > 0) || skin().joints[j].is_node_of_mesh) continue;
             is_odd_[j] = least[j] < kLeastScale || most[j] > kMostScale;
@@ -227,6 +292,9 @@ private:
         BodyOptions options;
         options.scale = flesh_.options_.scale;
         options.cells.count = flesh_.options_.particles;
+        options.cells.spacing = flesh_.options_.spacing.value_or(0);
+        options.separate = flesh_.options_.separate;
+        options.fields = flesh_.options_.fields;
         Result<Body> made =
             make_body(flesh_.surface_, flesh_.options_.material, options, context_, &flesh_.report_.body);
         if (!made) return made.error();
@@ -236,6 +304,11 @@ private:
             inward_weights(body(), flesh_.surface_, skin().weights, skin().joints.size(), neighbours_, context_);
         if (!found) return found.error();
         flesh_.weights_ = std::move(*found);
+        if (flesh_.options_.loose.empty()) return Success{};
+        Result<std::vector<float>> loose =
+            inward_values(body(), flesh_.surface_, flesh_.options_.loose, neighbours_, context_);
+        if (!loose) return loose.error();
+        loose_ = std::move(*loose);
         return Success{};
     }
 
@@ -270,12 +343,13 @@ private:
 
     void find_softness() {
         const std::size_t count = body().particle_count();
-        const auto h = float(body().spacing());
         std::vector<float> depth(count);
         for (std::size_t i = 0; i < count; ++i)
             depth[i] = std::max(0.0f, -body().field->distance(body().rest[i]) - body().field_radius);
-        const std::vector<Bone> bones = find_bones();
         flesh_.softness_.assign(count, 1);
+        find_thin(depth);
+        if (!skin().has_bones) return soften_by_depth(depth);
+        const std::vector<Bone> bones = find_bones();
         parallel_for(context_, count, kTargetsGrain, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) {
                 const Vec3d at = body().rest[i].cast<double>();
@@ -286,6 +360,26 @@ private:
                     flesh_.softness_[i] = float(nearest / std::max(nearest + double(depth[i]), 1e-12));
             }
         });
+    }
+
+    /// Without bones: 0 where it is deepest around, by the way up the lattice.
+    void soften_by_depth(const std::vector<float>& depth) {
+        std::vector<Index> order(depth.size());
+        std::iota(order.begin(), order.end(), Index{0});
+        std::ranges::stable_sort(order, std::greater<>(), [&](Index i) { return depth[i]; });
+        std::vector<float> top = depth;
+        for (const Index i : order) { // deeper ones have theirs
+            Index up = i;
+            for (const Index n : neighbours_[i])
+                if (n != kNoIndex && depth[n] > depth[up]) up = n;
+            top[i] = std::max(top[i], top[up]);
+            if (top[i] > 0) flesh_.softness_[i] = 1 - depth[i] / top[i];
+        }
+    }
+
+    void find_thin(const std::vector<float>& depth) {
+        const std::size_t count = depth.size();
+        const auto h = float(body().spacing());
         std::vector<float> deepest = depth; // within a few cells
         for (int step = 0; step < kThinReach; ++step) {
             const std::vector<float> before = deepest;
@@ -299,7 +393,7 @@ private:
 
     /// How far the joints alone crush each cell in the clips: a bone that holds a crushed cell turns it inside out.
     void find_folds() {
-        flesh_.linear_.assign(body().particle_count(), 0);
+        flesh_.linear_.assign(body().particle_count(), !skin().has_bones);
         least_volume_.assign(body().particle_count(), 1);
         std::vector<Eigen::Affine3d> transforms(skin().joints.size());
         const auto& cells = body().cells.cell_corners;
@@ -337,28 +431,43 @@ private:
         Follow& follow = flesh_.follow_;
         const std::size_t count = body().particle_count();
         const auto leash = float(o.leash.value_or(2 * body().spacing()));
-        follow.damping = {float(o.damping)};
+        follow.damping.clear();
         follow.most_acceleration = o.most_acceleration;
         for (std::size_t i = 0; i < count; ++i) {
             const FleshWeights& of = flesh_.weights_[i];
             float strength = 0, scaled = 0;
+            double core = o.core, edge = o.frequency, surface = o.surface_frequency, damping = o.damping;
             for (std::size_t k = 0; k < FleshWeights::kMost; ++k) {
-                strength += of.weights[k] * strengths_[of.joints[k]];
-                scaled += of.weights[k] * float(is_scaled_[of.joints[k]]);
+                const Index joint = of.joints[k];
+                scaled += of.weights[k] * float(is_scaled_[joint]);
+                if (soft_of_[joint] == o.soft.size()) {
+                    strength += of.weights[k];
+                    continue;
+                }
+                const SoftJoints& soft = o.soft[soft_of_[joint]];
+                const auto weight = double(of.weights[k]);
+                strength += of.weights[k] * float(soft.strength);
+                core += weight * (soft.core.value_or(o.core) - o.core);
+                edge += weight * (soft.frequency.value_or(o.frequency) - o.frequency);
+                surface += weight * (soft.surface_frequency.value_or(o.surface_frequency) - o.surface_frequency);
+                damping += weight * (soft.damping.value_or(o.damping) - o.damping);
             }
+            if (!loose_.empty()) strength *= 1 - loose_[i] * (1 - float(o.loose_strength));
             const double u = double(flesh_.softness_[i]);
-            flesh_.linear_[i] = scaled > kScaledShare;
+            const bool is_stiff = scaled > kScaledShare;
+            if (is_stiff) flesh_.linear_[i] = 1;
             const float whole = std::clamp((least_volume_[i] - kFolded) / (kWhole - kFolded), 0.0f, 1.0f);
-            const bool is_held =
-                flesh_.linear_[i] || (u < o.core && strength > kHeldStrength && whole >= 1) || o.core >= 1;
-            const double out = std::clamp((1 - u) / std::max(1 - o.core, 1e-9), 0.0, 1.0);
-            double frequency = o.surface_frequency + (o.frequency - o.surface_frequency) * out * std::sqrt(out);
-            if (is_thin_[i]) frequency = std::max(frequency, o.frequency);
-            frequency = o.surface_frequency + (frequency - o.surface_frequency) * double(whole);
+            const bool is_held = is_stiff || (u < core && strength > kHeldStrength && whole >= 1) || core >= 1;
+            const double out = std::clamp((1 - u) / std::max(1 - core, 1e-9), 0.0, 1.0);
+            double frequency = surface + (edge - surface) * out * std::sqrt(out);
+            if (is_thin_[i]) frequency = std::max(frequency, edge);
+            frequency = std::max(0.0, surface + (frequency - surface) * double(whole));
             follow.frequency.push_back(is_held ? std::numeric_limits<float>::infinity()
                                                : float(frequency) * std::sqrt(strength));
             follow.leash.push_back(strength < kFreeStrength ? std::numeric_limits<float>::infinity()
                                                             : leash / (strength * strength));
+            follow.damping.push_back(float(std::max(0.0, damping)));
+            if (!follow.passing.empty()) follow.groups.push_back(group_of_[of.joints[0]]); // the largest is first
             flesh_.report_.held += is_held;
             flesh_.report_.thin += is_thin_[i];
         }
@@ -437,7 +546,9 @@ private:
     const RunContext& context_;
     std::vector<std::size_t> clips_;
     Flesh flesh_;
-    std::vector<float> strengths_;        ///< of joints
+    std::vector<std::size_t> soft_of_;    ///< of joints: number in FleshOptions::soft, or behind its end
+    std::vector<std::uint16_t> group_of_; ///< of joints, for contact; empty: everything touches
+    std::vector<float> loose_;            ///< of particles; empty: none is
     std::vector<std::uint8_t> is_scaled_; ///< of joints
     std::vector<std::uint8_t> is_odd_;    ///< of joints
     std::vector<std::array<Index, 6>> neighbours_;

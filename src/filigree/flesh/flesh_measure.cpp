@@ -79,7 +79,6 @@ Result<FleshMeasure> measure_flesh(const Flesh& flesh, const FleshClip& clip, st
     if (!cut) return cut.error();
     const std::span<const Triangle> triangles = cut->triangles;
     std::vector<Vec3f> soft(count), plain(count);
-    std::vector<Eigen::Affine3d> transforms(skin.joints.size());
     const double rest = volume_of(flesh.surface().positions, triangles);
     const double diagonal = bounds(flesh.surface()).diagonal();
     const double step = kOverlapStep * flesh.body()->spacing() / flesh.scale();
@@ -100,9 +99,8 @@ Result<FleshMeasure> measure_flesh(const Flesh& flesh, const FleshClip& clip, st
         if (context.is_cancelled()) return cancelled_error();
         context.report("measuring '" + clip.name + "'", double(frame) / double(frames));
         carrier->at(clip, frame, soft, {}, context);
-        skin.transforms(clip.clip, std::min(double(frame) / clip.frames_per_second, skin.clips[clip.clip].seconds),
-                        transforms);
-        skin_positions(skin, transforms, plain, context);
+        const double seconds = std::min(double(frame) / clip.frames_per_second, skin.clips[clip.clip].seconds);
+        if (Status placed = clip_positions(skin, clip.clip, seconds, plain, context); !placed) return placed.error();
         const double now = volume_of(soft, triangles) / rest, of_skin = volume_of(plain, triangles) / rest;
         measure.least_volume = std::min(measure.least_volume, now);
         measure.most_volume = std::max(measure.most_volume, now);

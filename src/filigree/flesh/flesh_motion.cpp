@@ -322,11 +322,9 @@ void FleshCarrier::at(const FleshClip& clip, std::size_t frame, std::span<Vec3f>
                     c.transforms);
     for (const Index p : c.left_out) {
         const Index v = c.vertices[p];
-        Eigen::Matrix<double, 3, 4> blend = Eigen::Matrix<double, 3, 4>::Zero();
-        for (Index i = skin.weights.first[v]; i < skin.weights.first[v + 1]; ++i)
-            blend += double(skin.weights.weights[i]) * c.transforms[skin.weights.joints[i]].affine();
-        positions[p] = (blend.leftCols<3>() * skin.mesh.positions[v].cast<double>() + blend.col(3)).cast<float>();
-        if (!gradients.empty()) gradients[p] = blend.leftCols<3>().cast<float>();
+        const Eigen::Affine3d blend = blended_transform(skin, c.transforms, v);
+        positions[p] = (blend * skin.mesh.positions[v].cast<double>()).cast<float>();
+        if (!gradients.empty()) gradients[p] = blend.linear().cast<float>();
     }
 }
 

@@ -56,6 +56,24 @@ void make_harmonic(std::span<const std::array<Index, 6>> neighbours, std::span<c
     }
 }
 
+/// Calls visit(particle, point of the surface, corners of its triangle) for particles near the surface or outside.
+template <class Visit>
+Status each_at_surface(const Body& body, const Mesh& surface, const RunContext& context, const Visit& visit) {
+    const Result<Triangulation> cut = triangulate(surface, context);
+    if (!cut) return cut.error();
+    const ClosestPointTree tree(surface.positions, cut->triangles, context);
+    const auto near = float(kNearSurface * body.spacing());
+    parallel_for(context, body.particle_count(), kWeightsGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            if (body.field->distance(body.rest[i]) < -near) continue;
+            const SurfacePoint point = tree.closest((body.rest[i].cast<double>() / body.scale).cast<float>());
+            if (point.triangle != kNoIndex) visit(i, point, cut->triangles[point.triangle]);
+        }
+    });
+    if (context.is_cancelled()) return cancelled_error();
+    return Success{};
+}
+
 } // namespace
 
 std::vector<std::array<Index, 6>> lattice_neighbours(const Body& body) {
@@ -74,28 +92,18 @@ Result<std::vector<FleshWeights>> inward_weights(const Body& body, const Mesh& s
                                                  std::size_t joints, std::span<const std::array<Index, 6>> neighbours,
                                                  const RunContext& context) {
     const std::size_t count = body.particle_count();
-    const Result<Triangulation> cut = triangulate(surface, context);
-    if (!cut) return cut.error();
-    const ClosestPointTree tree(surface.positions, cut->triangles, context);
     std::vector<std::uint8_t> fixed(count);
     std::vector<std::vector<std::pair<Index, double>>> at_surface(count); // by joint
-    const auto near = float(kNearSurface * body.spacing());
-    parallel_for(context, count, kWeightsGrain, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            if (body.field->distance(body.rest[i]) < -near) continue;
-            const SurfacePoint point = tree.closest((body.rest[i].cast<double>() / body.scale).cast<float>());
-            if (point.triangle == kNoIndex) continue;
+    const Status found_points =
+        each_at_surface(body, surface, context, [&](std::size_t i, const SurfacePoint& point, const Triangle& corners) {
             fixed[i] = 1;
             std::map<Index, double> sums;
-            for (int k = 0; k < 3; ++k) {
-                const Index v = cut->triangles[point.triangle][k];
-                for (Index w = weights.first[v]; w < weights.first[v + 1]; ++w)
+            for (int k = 0; k < 3; ++k)
+                for (Index w = weights.first[corners[k]]; w < weights.first[corners[k] + 1]; ++w)
                     sums[weights.joints[w]] += double(point.barycentric[k]) * double(weights.weights[w]);
-            }
             at_surface[i].assign(sums.begin(), sums.end());
-        }
-    });
-    if (context.is_cancelled()) return cancelled_error();
+        });
+    if (!found_points) return found_points.error();
     std::vector<std::uint8_t> counts(joints);
     for (const auto& of : at_surface)
         for (const auto& [joint, weight] : of) counts[joint] |= weight > 0;
@@ -134,6 +142,22 @@ Result<std::vector<FleshWeights>> inward_weights(const Body& body, const Mesh& s
         }
     });
     return found;
+}
+
+Result<std::vector<float>> inward_values(const Body& body, const Mesh& surface, std::span<const float> values,
+                                         std::span<const std::array<Index, 6>> neighbours, const RunContext& context) {
+    std::vector<std::uint8_t> fixed(body.particle_count());
+    std::vector<double> x(body.particle_count());
+    const Status found =
+        each_at_surface(body, surface, context, [&](std::size_t i, const SurfacePoint& point, const Triangle& corners) {
+            fixed[i] = 1;
+            for (int k = 0; k < 3; ++k) x[i] += double(point.barycentric[k]) * double(values[corners[k]]);
+        });
+    if (!found) return found.error();
+    make_harmonic(neighbours, fixed, x);
+    std::vector<float> inside(x.size());
+    for (std::size_t i = 0; i < x.size(); ++i) inside[i] = float(std::clamp(x[i], 0.0, 1.0));
+    return inside;
 }
 
 } // namespace filigree

@@ -16,4 +16,8 @@ Result<std::vector<FleshWeights>> inward_weights(const Body& body, const Mesh& s
                                                  std::size_t joints, std::span<const std::array<Index, 6>> neighbours,
                                                  const RunContext& context);
 
+/// The same of one number a vertex, 0 .. 1.
+Result<std::vector<float>> inward_values(const Body& body, const Mesh& surface, std::span<const float> values,
+                                         std::span<const std::array<Index, 6>> neighbours, const RunContext& context);
+
 } // namespace filigree

@@ -59,6 +59,7 @@ double EnergyWatch::excess(const Energy& energy, double allowed, double least) {
 }
 
 double left_alone_from(const SceneFile& scene) {
+    if (!scene.follows.empty()) return kForEver;
     double from = end_of(scene.world.wind);
     for (const ScenePin& pin : scene.pins) from = std::max(from, end_of(pin.motion));
     for (const SceneObstacle& obstacle : scene.obstacles) from = std::max(from, end_of(obstacle.obstacle.motion));

@@ -1,6 +1,7 @@
 #include "filigree/scene/finer_check.h"
 
 #include "filigree/restore.h"
+#include "filigree/scene/following.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +9,10 @@
 namespace filigree {
 
 namespace {
+
+void require(const Status& status) {
+    if (!status) throw BadResultAccess(status.error());
+}
 
 void add(TruthError& error, std::span<const Vec3f> found, std::span<const Vec3f> truth, double diagonal) {
     double squares = 0;
@@ -68,10 +73,6 @@ public:
     }
 
 private:
-    static void require(const Status& status) {
-        if (!status) throw BadResultAccess(status.error());
-    }
-
     std::size_t number_;
     const ReadyBody& body_;
     Restorer restorer_;
@@ -84,9 +85,17 @@ std::vector<FinerCheck> compare(const SceneFile& scene, const ReadyScene& ready,
                                 std::size_t moments, const RunContext& context) {
     RunContext silent = context;
     silent.progress = nullptr;
-    const ReadyScene finer_ready = set_up(finer_scene(scene, ready), silent).value();
+    const SceneFile finer_file = finer_scene(scene, ready);
+    const ReadyScene finer_ready = set_up(finer_file, silent).value();
     Simulation finer = Simulation::create(finer_ready.world, finer_ready.actors, scene.step, silent).value();
     Simulation carried = Simulation::create(ready.world, ready.actors, scene.step, silent).value();
+    std::vector<Following> following;
+    for (std::size_t b = 0; b < finer_ready.bodies.size(); ++b)
+        if (finer_ready.bodies[b].follow) {
+            following.emplace_back(finer_ready.bodies[b], finer_ready.actors[b], b, scene.step.frames_per_second,
+                                   silent);
+            require(following.back().begin(finer));
+        }
     std::vector<Compared> bodies;
     std::vector<FinerCheck> checks(ready.bodies.size());
     for (std::size_t b = 0; b < checks.size(); ++b) {
@@ -97,6 +106,7 @@ std::vector<FinerCheck> compare(const SceneFile& scene, const ReadyScene& ready,
     std::size_t compared = 0;
     for (std::size_t frame = 1; frame <= frames; ++frame) {
         context.report("simulating with eight times the particles", double(frame - 1) / double(frames));
+        for (Following& one : following) require(one.next(finer));
         finer.advance(silent).value();
         if (frame * count / frames == compared) continue;
         compared = frame * count / frames;

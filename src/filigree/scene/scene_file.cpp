@@ -5,9 +5,9 @@
 #include "filigree/file.h"
 #include "filigree/io/model/model_file.h"
 #include "filigree/io/system/file.h"
+#include "filigree/mesh/mesh_map.h"
 #include "filigree/physics/body/fields.h"
 #include "filigree/physics/material.h"
-#include "filigree/scene/mesh_map.h"
 #include "filigree/scene/scene_table.h"
 #include "filigree/scene/world_setup.h"
 
@@ -113,6 +113,7 @@ public:
         each("heat", [&](const SceneTable& in) { in.read(&scene_.world.heat_sources.emplace_back()); });
         each("pair", [&](const SceneTable& in) { read_pair(in); });
         each("hand", [&](const SceneTable& in) { read_hand(in); });
+        each("follow", [&](const SceneTable& in) { read_follow(in); });
         scene_.content = spelled();
         return std::move(scene_);
     }
@@ -417,6 +418,49 @@ private:
         if (!in.has("target")) in.fail("[[hand]] needs a target: where it pulls to");
         if (!(hand.hand.from < hand.hand.until)) in.fail("until", "a hand lets go after it takes hold");
         scene_.hands.push_back(std::move(hand));
+    }
+
+    void read_follow(const SceneTable& in) {
+        SceneFollow follow;
+        follow.line = in.line();
+        in.read(&follow);
+        if (const std::string wrong = follow.loose_from.empty() ? "" : check_mesh_map(follow.loose_from);
+            !wrong.empty())
+            in.fail("loose_from", wrong);
+        if (follow.loose_values[0] == follow.loose_values[1])
+            in.fail("loose_values", "the two values of 'loose_values' are the same");
+        in.each("joint", [&](const SceneTable& joint) {
+            SceneFollowJoint one;
+            joint.read(&one);
+            if (one.soft.pattern.empty()) joint.fail("[[follow.joint]] needs `name`: a joint, or a pattern");
+            const bool holds_otherwise =
+                one.soft.core || one.soft.frequency || one.soft.surface_frequency || one.soft.damping;
+            if (!joint.has("strength") && holds_otherwise) one.soft.strength = 1;
+            follow.joints.push_back(std::move(one));
+        });
+        in.each("contact", [&](const SceneTable& contact) {
+            SceneFollowContact one;
+            contact.read(&one);
+            if (one.limbs.first.empty() || one.limbs.second.empty())
+                contact.fail("[[follow.contact]] needs first and second: joints, or patterns");
+            follow.contacts.push_back(std::move(one));
+        });
+        for (const std::size_t number : bodies_of(in, follow.named)) {
+            const SceneBody& body = scene_.bodies[number];
+            if (!body.group.empty() && body.group != follow.named && !follow.named.empty())
+                in.fail("body", fmt::format("bodies of one [[body]] are alike; name '{}'", body.group));
+            if (body.material.model != MaterialModel::fem)
+                in.fail(fmt::format("a [[follow]] is for bodies of the model fem, and '{}' is of another", body.name));
+            if (std::ranges::count(scene_.fractures, number, &SceneFracture::body) > 0)
+                in.fail(fmt::format("'{}' has a [[fracture]], and bodies that break do not follow", body.name));
+            if (std::ranges::count(scene_.follows, number, &SceneFollow::body) > 0)
+                in.fail("a body has one [[follow]] at most");
+            if (body.mesh.empty() && follow.animation.empty())
+                in.fail(fmt::format("'{}' is a built-in shape; [[follow]] needs `animation`: the file that moves it",
+                                    body.name));
+            follow.body = number;
+            scene_.follows.push_back(follow);
+        }
     }
 
     void read_picture(const SceneTable& in) {

@@ -329,6 +329,69 @@ const SceneKey kKeys[] = {
     key<&SceneHand::hand, &Hand::from>("hand", "from", "s", from(0, 1e9), "time at which it takes hold"),
     key<&SceneHand::hand, &Hand::until>("hand", "until", "s", from(0, 1e9), "time at which it lets go", "to the end"),
 
+    key<&SceneFollow::named>(
+        "follow", "body", "", kAnything,
+        "name of the body that becomes the flesh of an animated character; its model has to be fem", "the only body"),
+    key<&SceneFollow::animation>("follow", "animation", "", kFile,
+                                 "glTF with a skin or morph targets, .pc2, .mdd, .usda or a model with poses (.fil), "
+                                 "whose vertices are those of "
+                                 "the body's mesh, relative to the scene's folder",
+                                 "the body's mesh"),
+    key<&SceneFollow::clip>("follow", "clip", "", kAnything, "name of its clip", "the first that moves"),
+    key<&SceneFollow::speed>("follow", "speed", "", above(0, 1e3), "how fast the clip plays"),
+    key<&SceneFollow::start>("follow", "start", "s", from(0, 1e6), "time of the clip at the start of the scene"),
+    key<&SceneFollow::repeat>("follow", "repeat", "", kAnything,
+                              "whether the clip begins again at its end; else its last pose stays"),
+    key<&SceneFollow::flesh, &FleshOptions::core>(
+        "follow", "core", "", from(0, 1), "how far from the bones to the skin all is held: 0 nothing, 1 everything"),
+    key<&SceneFollow::flesh, &FleshOptions::frequency>("follow", "frequency", "Hz", from(0, 1e6),
+                                                       "of the springs at the edge of the core"),
+    key<&SceneFollow::flesh, &FleshOptions::surface_frequency>("follow", "surface_frequency", "Hz", from(0, 1e6),
+                                                               "of the springs at the skin"),
+    key<&SceneFollow::flesh, &FleshOptions::damping>("follow", "damping", "1/s", from(0, 1e6),
+                                                     "of motion beside the animation"),
+    key<&SceneFollow::flesh, &FleshOptions::leash>(
+        "follow", "leash", "m", above(0, 1e6), "further from the animation matter is pulled back hard", "two spacings"),
+    key<&SceneFollow::flesh, &FleshOptions::most_acceleration>(
+        "follow", "most_acceleration", "m/s^2", above(0, 1e9),
+        "matter feels no more of the animation's acceleration; the rest moves it along"),
+    key<&SceneFollow::is_sculpted>("follow", "sculpted_gravity", "", kAnything,
+                                   "whether the bind pose has its shape under gravity, and does not sag"),
+    key<&SceneFollow::loose_from>(
+        "follow", "loose_from", "", kAnything,
+        "numbers of the mesh's vertices that say how loose the matter is, as `from` of [[map]]", "nothing"),
+    key<&SceneFollow::loose_values>("follow", "loose_values", "", kAnything,
+                                    "two numbers of the mesh: where matter holds as the joints say, and where it holds "
+                                    "with `loose_strength`"),
+    key<&SceneFollow::flesh, &FleshOptions::loose_strength>("follow", "loose_strength", "", from(0, 1),
+                                                            "factor of the springs' stiffness where matter is loose"),
+
+    key<&SceneFollowJoint::soft, &SoftJoints::pattern>(
+        "follow.joint", "name", "", kAnything,
+        "name of a joint, with all joints below it; `*` stands for any letters. The first that fits counts. Required"),
+    key<&SceneFollowJoint::soft, &SoftJoints::strength>(
+        "follow.joint", "strength", "", from(0, 1),
+        "factor of the springs' stiffness; below 0.75 nothing is held, and below 0.1 there is no leash",
+        "0.02, or 1 "
+        "with other keys"),
+    key<&SceneFollowJoint::soft, &SoftJoints::core>("follow.joint", "core", "", from(0, 1), "as of [[follow]]",
+                                                    "that of [[follow]]"),
+    key<&SceneFollowJoint::soft, &SoftJoints::frequency>("follow.joint", "frequency", "Hz", from(0, 1e6),
+                                                         "as of [[follow]]", "that of [[follow]]"),
+    key<&SceneFollowJoint::soft, &SoftJoints::surface_frequency>(
+        "follow.joint", "surface_frequency", "Hz", from(0, 1e6), "as of [[follow]]", "that of [[follow]]"),
+    key<&SceneFollowJoint::soft, &SoftJoints::damping>("follow.joint", "damping", "1/s", from(0, 1e6),
+                                                       "as of [[follow]]", "that of [[follow]]"),
+
+    key<&SceneFollowContact::limbs, &JointContact::first>(
+        "follow.contact", "first", "", kAnything,
+        "name of a joint, with all joints below it; `*` stands for any letters. Required"),
+    key<&SceneFollowContact::limbs, &JointContact::second>("follow.contact", "second", "", kAnything,
+                                                           "the other, named alike. Required"),
+    key<&SceneFollowContact::limbs, &JointContact::touch>(
+        "follow.contact", "touch", "", kAnything,
+        "whether what they carry touches; the last entry that fits two joints counts, and without one they touch"),
+
     key<&ScenePicture::view>("picture", "view", "", one_of("front side top iso"), "view direction"),
     key<&ScenePicture::up>("picture", "up", "", one_of("x y z"), "up axis"),
     key<&ScenePicture::eye>("picture", "eye", "m", kAnything, "position of the camera; needs `target`",

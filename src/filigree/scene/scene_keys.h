@@ -10,9 +10,9 @@
 namespace filigree {
 
 /// A struct that keys fill. Those of a table fill one or several.
-using SceneOwner =
-    std::variant<SceneFile*, StepOptions*, World*, SceneBody*, ShapeOptions*, Material*, SceneObstacle*, HeatSource*,
-                 SceneMap*, ScenePair*, SceneFracture*, SceneCrack*, ScenePin*, SceneForce*, SceneHand*, ScenePicture*>;
+using SceneOwner = std::variant<SceneFile*, StepOptions*, World*, SceneBody*, ShapeOptions*, Material*, SceneObstacle*,
+                                HeatSource*, SceneMap*, ScenePair*, SceneFracture*, SceneCrack*, ScenePin*, SceneForce*,
+                                SceneHand*, SceneFollow*, SceneFollowJoint*, SceneFollowContact*, ScenePicture*>;
 
 /// Where the value of a key goes. Its type says what stands in the file: an enum a word, a Vec3f a colour.
 using KeyPlace =

@@ -75,6 +75,7 @@ Result<SceneRun> SceneRun::create(const SceneFile& scene, const ReadyScene& read
     Result<Simulation> simulation = Simulation::create(ready.world, ready.actors, scene.step, context);
     if (!simulation) return simulation.error();
     SceneRun run(scene, ready, std::move(*simulation), context.threads());
+    if (const Status followed = run.follow_characters(); !followed) return followed.error();
     if (const Status followed = run.follow(checks); !followed) return followed.error();
     run.recording_.totals.start = run.energy();
     if (left_alone_from(scene) <= 0) run.recording_.energy.begin(run.recording_.totals.start);
@@ -83,6 +84,17 @@ Result<SceneRun> SceneRun::create(const SceneFile& scene, const ReadyScene& read
     run.times_ = {}; // the start is no frame
     for (CheckTotals& check : run.recording_.checks) check = {};
     return run;
+}
+
+Status SceneRun::follow_characters() {
+    for (std::size_t b = 0; b < ready_->bodies.size(); ++b) {
+        const ReadyBody& body = ready_->bodies[b];
+        if (!body.follow) continue;
+        Following& one = following_.emplace_back(body, ready_->actors[b], b, scene_->step.frames_per_second, always_);
+        if (const Status begun = one.begin(simulation_); !begun)
+            return scene_error(*scene_, body.follow->line, begun.error().code, begun.error().message);
+    }
+    return Success{};
 }
 
 Status SceneRun::follow(bool checks) {
@@ -122,6 +134,8 @@ Status SceneRun::advance_to(std::uint64_t last, const RunContext& context) {
     silent.progress = nullptr;
     while (frame() < last) {
         context.report("simulating", double(frame() - first) / double(last - first));
+        for (Following& one : following_)
+            if (const Status set = one.next(simulation_); !set) return set;
         const Result<FrameReport> report = simulation_.advance(silent);
         if (!report) return report.error();
         recording_.totals.add(*report);
@@ -144,6 +158,9 @@ Status SceneRun::record_body(std::size_t b) {
     pose.positions.resize(body.model.driver().vertices.size());
     pose.gradients.resize(pose.positions.size());
     simulation_.attached(follower.driver, pose.positions, pose.gradients, always_);
+    for (Following& one : following_)
+        if (one.body() == b)
+            one.carry_left_out(simulation_.frame(), body.model.driver().vertices, pose.positions, pose.gradients);
     for (Mat3f& gradient : pose.gradients) gradient *= float(body.scale);
     const double moved = now_seconds();
     hold_lost_of(b);
@@ -365,6 +382,13 @@ std::string SceneRun::energy_warning() const {
                        place_text(watch.place));
 }
 
+/// The skin of a character crushes cells that follow it; they open again with it.
+bool SceneRun::is_inside_out() const {
+    for (std::size_t b = 0; b < recording_.doubts.size(); ++b)
+        if (recording_.doubts[b].inversion && !ready_->bodies[b].follow) return true;
+    return false;
+}
+
 std::optional<std::string> SceneRun::broke_down() const {
     std::vector<std::string> what;
     const auto any = [&](const auto& has) { return std::ranges::any_of(recording_.doubts, has); };
@@ -373,8 +397,7 @@ std::optional<std::string> SceneRun::broke_down() const {
         what.emplace_back("the motion broke down");
     if (any([](const BodyDoubts& body) { return body.unstable.has_value(); }))
         what.emplace_back("frames were not stepped stably");
-    if (any([](const BodyDoubts& body) { return body.inversion.has_value(); }))
-        what.emplace_back("cells were inside out");
+    if (is_inside_out()) what.emplace_back("cells were inside out");
     if (recording_.energy.grown > 0) what.emplace_back("energy came from nowhere");
     if (what.empty()) return std::nullopt;
     return fmt::format("{}: {}, so the result is not to be trusted; the warnings say where, and what to change.",

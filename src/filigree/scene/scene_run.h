@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/restore.h"
+#include "filigree/scene/following.h"
 #include "filigree/scene/recording.h"
 #include "filigree/scene/world_setup.h"
 
@@ -54,10 +55,12 @@ private:
 
     SceneRun(const SceneFile& scene, const ReadyScene& ready, Simulation simulation, unsigned threads);
     Status follow(bool checks);
+    Status follow_characters();
     Status record_body(std::size_t body);
     void hold_lost_of(std::size_t body);
     void check_body(std::size_t body);
     void note_doubts(const FrameReport& report);
+    bool is_inside_out() const;
     void note_flow(const FrameReport& report);
     void watch_energy();
     std::size_t fastest_body() const;
@@ -74,6 +77,7 @@ private:
     RunContext always_; ///< not cancelled: what is recorded of a frame is whole
     Simulation simulation_;
     std::vector<Follower> followers_;
+    std::vector<Following> following_; ///< of the bodies that follow a character
     Recording recording_;
     RunTimes times_;
 };

@@ -34,6 +34,13 @@ std::string table_with(std::string_view key) {
     return "";
 }
 
+/// Whether it is one of the lists of tables within a table, such as [[follow.joint]].
+bool is_list_within(std::string_view table, std::string_view key, const toml::node& value) {
+    const std::string name = fmt::format("{}.{}", table, key);
+    return value.is_array_of_tables() &&
+           std::ranges::any_of(scene_keys(), [&](const SceneKey& known) { return known.table == name; });
+}
+
 /// A value as messages show it: what was written, or what kind of thing it is.
 std::string shown(const toml::node& node) {
     if (const auto text = node.value_exact<std::string>()) return "\"" + *text + "\"";
@@ -309,7 +316,7 @@ SceneTable::SceneTable(const std::string& path, std::string_view name, const tom
     for (const SceneKey& key : scene_keys())
         if (key.table == name) known.push_back(key.name);
     for (const auto& [key, value] : table)
-        if (!find_key(name, key.str())) {
+        if (!find_key(name, key.str()) && !is_list_within(name, key.str(), value)) {
             const std::string other = table_with(key.str());
             const std::string hint =
                 other.empty() ? suggestion(key.str(), known) : fmt::format("; it belongs to {}", other);

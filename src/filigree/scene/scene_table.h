@@ -29,6 +29,14 @@ public:
     /// The same of one key.
     void read(std::string_view key, SceneOwner owner) const;
 
+    /// Calls read(table) for each entry of a list of tables in this one, such as [[follow.joint]].
+    template <class Read>
+    void each(std::string_view key, const Read& read) const {
+        const toml::array* entries = table_.get_as<toml::array>(key);
+        const std::string name = std::string(name_) + "." + std::string(key);
+        for (std::size_t k = 0; entries && k < entries->size(); ++k)
+            if (const toml::table* entry = entries->get_as<toml::table>(k)) read(SceneTable(path_, name, *entry));
+    }
     void refuse_both(std::string_view one, std::string_view other) const;
     void refuse_two_regions() const; ///< box, ball and vertices
     /// Refuses keys of other shapes; shape: "mesh" or "shape" for bodies.

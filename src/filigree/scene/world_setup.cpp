@@ -2,21 +2,24 @@
 
 #include "filigree/core/math.h"
 #include "filigree/file.h"
+#include "filigree/flesh.h"
 #include "filigree/fracture.h"
 #include "filigree/fracture/broken_model.h"
 #include "filigree/io/model/model_file.h"
 #include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
 #include "filigree/mesh/closest_point.h"
+#include "filigree/mesh/mesh_map.h"
 #include "filigree/physics/body/own_weight.h"
 #include "filigree/physics/grid/grid_limits.h"
-#include "filigree/scene/mesh_map.h"
 #include "filigree/scene/particles_near.h"
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -24,6 +27,8 @@
 namespace filigree {
 
 namespace {
+
+namespace fs = std::filesystem;
 
 const Vec3f kBodyColors[] = {
     {0.86f, 0.52f, 0.36f}, {0.42f, 0.60f, 0.80f}, {0.55f, 0.70f, 0.45f}, {0.80f, 0.68f, 0.38f}, {0.62f, 0.50f, 0.72f}};
@@ -135,7 +140,8 @@ private:
     void add_body(const SceneBody& from) {
         const auto alike = std::ranges::find(result_.bodies, from.group, &ReadyBody::group);
         const bool is_another = !from.group.empty() && alike != result_.bodies.end();
-        ReadyBody body = is_another ? *alike : ready(from);
+        const SceneFollow* const follow = follow_of(from);
+        ReadyBody body = is_another ? *alike : follow ? ready_flesh(from, *follow) : ready(from);
         body.name = from.name;
         body.color = from.color.value_or(kBodyColors[result_.bodies.size() % std::size(kBodyColors)]);
         body.has_own_color = !from.color;
@@ -144,7 +150,7 @@ private:
         const Vec3d centre = from.centre.value_or(middle + body.scale * body.origin) + from.aside;
         actor.placement.linear() = math::matrix(from.rotation);
         actor.placement.translation() = centre - actor.placement.linear() * middle;
-        if (!is_another) warn_of_weight(from, *body.body, actor.placement.linear());
+        if (!is_another && !follow) warn_of_weight(from, *body.body, actor.placement.linear());
         result_.actors.push_back(std::move(actor));
         result_.bodies.push_back(std::move(body));
     }
@@ -176,6 +182,85 @@ private:
         if (const std::optional<CoarseDriver> coarse = coarse_driver(body.driver, body.model, *body.body))
             warn(fmt::format("{}: {} (stripped with base {} and max_edge {:.2g}).", called(from), coarse->sentence(),
                              coarse->base, coarse->max_edge));
+        return body;
+    }
+
+    const SceneFollow* follow_of(const SceneBody& body) const {
+        const auto number = std::size_t(&body - scene_.bodies.data());
+        const auto found = std::ranges::find(scene_.follows, number, &SceneFollow::body);
+        return found == scene_.follows.end() ? nullptr : &*found;
+    }
+
+    /// The skin that a body follows; its mesh is the body's, in the bind pose.
+    SkinnedMesh skin_of(const SceneFollow& follow, const Mesh& mesh, const std::string& mesh_path) {
+        const std::string& path = follow.animation.empty() ? mesh_path : follow.animation;
+        if (!fs::is_directory(path_of(path))) hash_.add(read_file(path_of(path)).value());
+        CharacterOptions options;
+        const Result<MeshFormat> format = mesh_format(path_of(path));
+        if (!follow.animation.empty() && !(format && *format == MeshFormat::gltf)) options.rest = &mesh;
+        SkinnedMesh skin = read_character(path_of(path), options, context_).value();
+        for (const std::string& warning : skin.warnings) warn(warning);
+        if (skin.mesh.vertex_count() != mesh.vertex_count())
+            throw BadResultAccess(
+                {ErrorCode::mismatch, fmt::format("{}: has {} vertices, and the body's mesh has {}", path,
+                                                  skin.mesh.vertex_count(), mesh.vertex_count())});
+        return skin;
+    }
+
+    std::size_t clip_of(const SceneFollow& follow, const SkinnedMesh& skin) const {
+        std::vector<std::string_view> names;
+        for (std::size_t c = 0; c < skin.clips.size(); ++c) {
+            const bool is_it = follow.clip.empty() ? skin.clips[c].seconds > 0 : skin.clips[c].name == follow.clip;
+            if (is_it) return c;
+            names.push_back(skin.clips[c].name);
+        }
+        throw BadResultAccess(
+            {ErrorCode::bad_file,
+             follow.clip.empty()
+                 ? std::string("the clips of its animation are single poses, and nothing moves")
+                 : fmt::format("there is no clip '{}'; there are {}", follow.clip, fmt::join(names, ", "))});
+    }
+
+    /// A body that is the flesh of a character.
+    ReadyBody ready_flesh(const SceneBody& from, const SceneFollow& follow) {
+        ReadyBody body;
+        body.group = from.group;
+        body.mesh_path = from.mesh;
+        body.follow = follow;
+        body.model = at_line(scene_, from.line, [&] { return model_of(from); });
+        body.flesh = at_line(scene_, follow.line, [&] {
+            SkinnedMesh skin = skin_of(follow, body.model.mesh, from.mesh);
+            body.clip = clip_of(follow, skin);
+            FleshOptions options = follow.flesh;
+            options.material = from.material;
+            options.particles = from.body.cells.count;
+            if (from.body.cells.spacing > 0) options.spacing = from.body.cells.spacing;
+            options.separate = from.body.separate;
+            options.scale = from.body.size ? *from.body.size / bounds(skin.mesh).size().maxCoeff() : from.body.scale;
+            options.fields = fields_of(from, skin.mesh);
+            options.gravity = math::matrix(from.rotation).transpose() * scene_.world.gravity;
+            options.sculpted_gravity = follow.is_sculpted;
+            for (const SceneFollowJoint& joint : follow.joints) options.soft.push_back(joint.soft);
+            for (const SceneFollowContact& contact : follow.contacts) options.contacts.push_back(contact.limbs);
+            if (!follow.loose_from.empty())
+                options.loose = in_range(mesh_map(skin.mesh, follow.loose_from).value(), follow.loose_values, {0, 1});
+            const std::array clips = {body.clip};
+            return std::make_shared<const Flesh>(Flesh::create(std::move(skin), options, clips, context_).value());
+        });
+        for (const std::string& warning : body.flesh->report().warnings) warn(called(from) + ": " + warning);
+        body.body = body.flesh->body();
+        body.report = body.flesh->report().body;
+        body.scale = body.flesh->scale();
+        const bool has_own_driver = !body.model.levels.empty();
+        if (!has_own_driver) body.model.mesh = body.flesh->skin().mesh; // in the bind pose
+        Mesh& mesh = body.model.mesh;
+        body.origin = std::exchange(mesh.origin, Vec3d::Zero());
+        hash_.add(mesh.positions);
+        hash_.add(mesh.corners);
+        if (!has_own_driver)
+            body.model = at_line(scene_, from.line, [&] { return stripped(std::move(mesh), from, *body.body); });
+        hash_.add(body.model.driver().vertices);
+        body.driver = measure_driver(body.model, *body.body);
         return body;
     }
 

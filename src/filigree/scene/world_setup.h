@@ -23,7 +23,10 @@ struct ReadyBody {
     std::shared_ptr<const FractureCells> cells; ///< of a body that breaks, in model units; else null
     CarriedByPieces pieces;                     ///< of such a body, whose model is in pieces too
     BrokenBodyReport broken;
-    bool keeps_closed_cracks = false; ///< in what is written
+    bool keeps_closed_cracks = false;   ///< in what is written
+    std::shared_ptr<const Flesh> flesh; ///< of a body that follows a character; else null
+    std::optional<SceneFollow> follow = {};
+    std::size_t clip = 0; ///< of the flesh's skin
     Vec3f color = Vec3f::Zero();
     bool has_own_color = false; ///< of the mesh's own, if it has some
 

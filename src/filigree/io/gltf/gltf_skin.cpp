@@ -353,6 +353,24 @@ Result<SkinnedMesh> read_skin(const std::filesystem::path& path, const RunContex
     return SkinReader(std::move(scene), context).read();
 }
 
+Eigen::Affine3d blended_transform(const SkinnedMesh& skin, std::span<const Eigen::Affine3d> transforms, Index vertex) {
+    Eigen::Affine3d blend(Eigen::Affine3d::MatrixType::Zero());
+    const SkinWeights& weights = skin.weights;
+    for (Index i = weights.first[vertex]; i < weights.first[vertex + 1]; ++i)
+        blend.affine() += double(weights.weights[i]) * transforms[weights.joints[i]].affine();
+    blend.makeAffine();
+    return blend;
+}
+
+Status clip_positions(const SkinnedMesh& skin, std::size_t clip, double seconds, std::span<Vec3f> positions,
+                      const RunContext& context) {
+    if (skin.surface) return skin.surface(clip, seconds, positions);
+    std::vector<Eigen::Affine3d> transforms(skin.joints.size());
+    skin.transforms(clip, seconds, transforms);
+    skin_positions(skin, transforms, positions, context);
+    return Success{};
+}
+
 void skin_positions(const SkinnedMesh& skin, std::span<const Eigen::Affine3d> transforms, std::span<Vec3f> positions,
                     const RunContext& context) {
     const SkinWeights& weights = skin.weights;

@@ -3,6 +3,7 @@
 
 #include "filigree/io/gltf/glb_levels.h"
 #include "filigree/io/gltf/glb_parts.h"
+#include "filigree/io/gltf/glb_skeleton.h"
 #include "filigree/io/gltf/glb_skin_animation.h"
 #include "filigree/io/gltf/gltf.h"
 #include "filigree/io/gltf/gltf_export_error.h"
@@ -121,6 +122,11 @@ public:
             if (!animation) return animation.error();
             played.push_back({clip, *std::move(animation), std::move(poses)});
         }
+        if (!options_.skeleton_of.empty()) {
+            Result<GlbSkeleton> read = GlbSkeleton::read(options_.skeleton_of, context_);
+            if (!read) return read.error();
+            skeleton_.emplace(std::move(*read));
+        }
         add_joints(skin, played);
         report_.vertices = skin.positions.size();
         report_.joints = skin.joints.size();
@@ -156,6 +162,7 @@ private:
     GlbBuilder builder_;
     Json meshes_ = Json::array(), nodes_ = Json::array(), roots_ = Json::array();
     GlbLevels levels_;
+    std::optional<GlbSkeleton> skeleton_;
     std::vector<std::size_t> level_nodes_;
     std::vector<std::string> lost_; ///< what glTF cannot hold
     ExportReport report_;
@@ -240,9 +247,11 @@ private:
             inverse_binds.push_back(Eigen::Matrix4f::Identity());
             inverse_binds.back().topRightCorner<3, 1>() = -skin.rest[j].cast<float>();
         }
+        if (skeleton_) skeleton_->add_nodes(builder_, nodes_, roots_);
         Json animations = Json::array();
         for (Played& clip : played) {
             Json moves = clip.animation.add_to(builder_, clip.clip.name, skin, first_joint, context_);
+            if (skeleton_) skeleton_->add_channels(builder_, clip.clip.name, moves);
             if (moves.is_null()) continue;
             clip.number = animations.size();
             animations.push_back(std::move(moves));

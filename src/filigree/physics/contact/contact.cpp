@@ -48,6 +48,7 @@ void Contacts::make_ready(const BodyState& state, std::size_t body, std::size_t 
     if (body >= matter_.size()) {
         matter_.resize(body + 1, std::make_shared<const BodyMatter>());
         own_cells_.resize(body + 1);
+        passing_.resize(body + 1);
         recovers_.resize(body + 1);
         touched_.resize(body + 1);
         loads_.resize(body + 1);
@@ -76,9 +77,18 @@ void Contacts::remove_body(std::span<const BodyState> bodies, std::size_t body) 
     std::erase_if(pairs_, [&](const ContactPair& pair) { return pair.points == id || pair.touched == id; });
     matter_[body] = std::make_shared<const BodyMatter>();
     own_cells_[body] = nullptr;
+    passing_[body] = nullptr;
     recovers_[body] = touched_[body] = 0;
     motions_.remove_body(body);
     list_work(bodies);
+}
+
+void Contacts::set_passing(std::size_t body, std::shared_ptr<const OwnCells::Passing> passing) {
+    if (!passing && !passing_[body]) return;
+    passing_[body] = std::move(passing);
+    const ColliderId id = ColliderId::body(body);
+    std::erase_if(pairs_, [&](const ContactPair& pair) { return pair.points == id && pair.touched == id; });
+    reach_ = -1;
 }
 
 void Contacts::set_obstacle(std::size_t obstacle, bool is_jump) {

@@ -40,6 +40,8 @@ public:
     /// An obstacle's motion was replaced. is_jump: it stands elsewhere, so that what was on its other side is where it
     /// is, and nothing holds on to it; else points are followed to where it stands.
     void set_obstacle(std::size_t obstacle, bool is_jump);
+    /// Between which limbs of a body there is no contact; null: everything touches.
+    void set_passing(std::size_t body, std::shared_ptr<const OwnCells::Passing> passing);
     /// Calls visit(other) for bodies that touch a body, or may soon.
     template <class Visit>
     void each_beside(std::size_t body, const Visit& visit) const {
@@ -221,9 +223,10 @@ private:
     bool between_bodies_, within_bodies_;
     std::vector<ObstacleShape> shapes_;
     std::vector<Vec3f> towards_; ///< of each obstacle, the way to it: of half-spaces that stand still; else 0
-    std::vector<std::shared_ptr<const BodyMatter>> matter_;  ///< of each body
-    std::vector<std::shared_ptr<const OwnCells>> own_cells_; ///< null: of bodies that do not meet themselves
-    std::vector<std::uint8_t> recovers_;                     ///< of each body: 1 while it does not meet itself
+    std::vector<std::shared_ptr<const BodyMatter>> matter_;         ///< of each body
+    std::vector<std::shared_ptr<const OwnCells>> own_cells_;        ///< null: of bodies that do not meet themselves
+    std::vector<std::shared_ptr<const OwnCells::Passing>> passing_; ///< of bodies; null: everything touches
+    std::vector<std::uint8_t> recovers_;                            ///< of each body: 1 while it does not meet itself
     MotionBounds motions_;
     CrushedParticles crushed_;
 

@@ -28,6 +28,33 @@ Embedding points_in_cells(const Body& body) {
 
 } // namespace
 
+OwnCells::Passing::Passing(const Body& body, std::span<const std::uint16_t> group,
+                           std::span<const std::array<std::uint16_t, 2>> pairs) {
+    groups_ = std::size_t{*std::ranges::max_element(group)} + 1;
+    passes_.assign(groups_ * groups_, 0);
+    for (const auto& [a, b] : pairs)
+        if (a < groups_ && b < groups_) passes_[a * groups_ + b] = passes_[b * groups_ + a] = 1;
+    const auto heaviest = [&](const Embedding& in, std::size_t point) { // of the particles that carry it
+        Index best = in.offsets[point];
+        for (Index k = best; k < in.offsets[point + 1]; ++k)
+            if (in.weights[k] > in.weights[best]) best = k;
+        return group[in.particles[best]];
+    };
+    const Embedding &points = body.surface.points, &own_corners = body.corners;
+    for (std::size_t s = 0; s < points.size(); ++s) of_point_.push_back(heaviest(points, s));
+    std::vector<unsigned> counts(groups_);
+    for (const auto& corners : body.cells.cell_corners) {
+        std::uint16_t most = 0;
+        std::ranges::fill(counts, 0u);
+        for (const Index corner : corners) {
+            const std::uint16_t of = own_corners.size() == 0 ? group[corner] : heaviest(own_corners, corner);
+            ++counts[of];
+            if (counts[of] > counts[most] || (counts[of] == counts[most] && of < most)) most = of;
+        }
+        of_cell_.push_back(most);
+    }
+}
+
 OwnCells::OwnCells(const Matter& matter)
     : matter_(matter), in_cells_(points_in_cells(matter.body())),
       points_(in_cells_.size() == 0 ? matter.body().surface.points : in_cells_), folded_cells_(matter) {
@@ -204,7 +231,7 @@ OwnCells::NearBoxes OwnCells::cell_boxes(std::span<const std::pair<Index, Index>
 
 /// near: a cluster with those whose cells its points might lie in.
 void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::span<const Extent> extents,
-                         const NearBoxes& boxes, const Vectors& positions, float reach,
+                         const NearBoxes& boxes, const Vectors& positions, float reach, const Passing* passing,
                          std::vector<Index>& found) const {
     const float around = reach + 2 * overhang_; // as in find
     struct Point {
@@ -248,8 +275,10 @@ void OwnCells::look_into(std::span<const std::pair<Index, Index>> near, std::spa
                     if (!box.holds(point.place, reach)) continue;
                     const float away = (box.centre - point.place).squaredNorm();
                     if (away >= point.least) continue;
+                    const Index cell = cells_[clusters_[other].first_cell + j];
+                    if (passing && passing->holds(point.number, cell)) continue;
                     point.least = away;
-                    found[point.number] = cells_[clusters_[other].first_cell + j];
+                    found[point.number] = cell;
                 }
             });
         }
@@ -324,7 +353,7 @@ std::size_t OwnCells::candidates(const Vectors& positions, float reach) const {
     return clusters_.size() < 2 ? 0 : near_of_find(extents(positions), reach).size();
 }
 
-std::vector<Index> OwnCells::find(const Vectors& positions, const Folds& folds, float reach,
+std::vector<Index> OwnCells::find(const Vectors& positions, const Folds& folds, float reach, const Passing* passing,
                                   const RunContext& context) const {
     std::vector<Index> found(points_.size(), kNoIndex);
     if (clusters_.size() < 2) return found;
@@ -338,9 +367,10 @@ std::vector<Index> OwnCells::find(const Vectors& positions, const Folds& folds, 
     parallel_for(context, starts.size() - 1, kOwnCellsGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k)
             look_into(std::span(near).subspan(starts[k], starts[k + 1] - starts[k]), around, boxes, positions, reach,
-                      found);
+                      passing, found);
     });
     for (const auto& [s, cell] : folds) {
+        if (passing && passing->holds(s, cell)) continue;
         const auto away = [&, p = embedded_point(points_, s, positions)](Index held_by) {
             return (CellBox(matter_.corners(held_by), positions).centre - p).squaredNorm();
         };

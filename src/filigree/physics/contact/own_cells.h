@@ -20,14 +20,29 @@ public:
 
     /// A surface point whose cell has folded, and the cell that is not far from it and holds the point; once a point.
     using Folds = std::vector<std::pair<Index, Index>>;
+    /// Between which of a body's limbs there is no contact.
+    class Passing {
+    public:
+        /// group: of each particle; pairs: of groups. body: with cells.
+        Passing(const Body& body, std::span<const std::uint16_t> group,
+                std::span<const std::array<std::uint16_t, 2>> pairs);
+        bool holds(Index point, Index cell) const { return passes_[of_point_[point] * groups_ + of_cell_[cell]]; }
+
+    private:
+        std::size_t groups_ = 0;
+        std::vector<std::uint16_t> of_point_, of_cell_;
+        std::vector<std::uint8_t> passes_; ///< of each pair of groups
+    };
+
     /// Those of points that may move by `reach` (m). Cost as FoldedCells::find, and O(cells around those that have
     /// folded).
     Folds folds(const Vectors& positions, float reach, const RunContext& context) const;
 
     /// For each surface point the far or folded cell that holds it, or the nearest of these within reach (m); kNoIndex
     /// where there is none. Cost O(clusters and folds, and cells and points that are near far cells). positions: of the
-    /// cells' corners.
-    std::vector<Index> find(const Vectors& positions, const Folds& folds, float reach, const RunContext& context) const;
+    /// cells' corners. passing: null where everything touches.
+    std::vector<Index> find(const Vectors& positions, const Folds& folds, float reach, const Passing* passing,
+                            const RunContext& context) const;
 
     bool are_far(Index cell, Index other) const;
 
@@ -65,7 +80,8 @@ private:
     NearBoxes cell_boxes(std::span<const std::pair<Index, Index>> near, const Vectors& positions,
                          const RunContext& context) const;
     void look_into(std::span<const std::pair<Index, Index>> near, std::span<const Extent> extents,
-                   const NearBoxes& boxes, const Vectors& positions, float reach, std::vector<Index>& found) const;
+                   const NearBoxes& boxes, const Vectors& positions, float reach, const Passing* passing,
+                   std::vector<Index>& found) const;
 
     void add_folds(Index own, std::span<const CellBox> boxes, const Vectors& positions, float reach,
                    Folds& folds) const;

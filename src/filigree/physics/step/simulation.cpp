@@ -303,6 +303,7 @@ Status Simulation::set_follow(std::size_t body, Follow follow, const Vectors& po
     BodyState& state = state_->body_of(body);
     if (follow.frequency.empty()) {
         release_targets(*state_, state);
+        state_->contacts.set_passing(state_->slot_of[body], nullptr);
         if (follows) targets.erase(place);
         return Success{};
     }
@@ -318,6 +319,10 @@ Status Simulation::set_follow(std::size_t body, Follow follow, const Vectors& po
     if (Status checked = check_finite(body, velocities, "target velocity"); !checked) return checked;
     if (const std::string wrong = check_follow(follow, positions.size()); !wrong.empty()) return usage(wrong);
     release_targets(*state_, state);
+    state_->contacts.set_passing(
+        state_->slot_of[body],
+        follow.passing.empty() ? nullptr
+                               : std::make_shared<const OwnCells::Passing>(*state.body, follow.groups, follow.passing));
     Targets made(body, std::move(follow), positions, velocities, state.body->spacing());
     state.follows = true;
     state.elasticity->set_crush_share(kFollowingCrush);

@@ -70,6 +70,10 @@ std::string check_follow(const Follow& follow, std::size_t count) {
     if (!(follow.leash_frequency >= 0 && std::isfinite(follow.leash_frequency)))
         return "follow.leash_frequency must be 0 or more, and finite.";
     if (!(follow.most_acceleration > 0)) return "follow.most_acceleration must be above 0.";
+    if (!follow.groups.empty() && follow.groups.size() != count)
+        return "follow.groups has " + std::to_string(follow.groups.size()) + " numbers for " + std::to_string(count) +
+               " particles.";
+    if (follow.groups.empty() && !follow.passing.empty()) return "follow.passing needs follow.groups.";
     return "";
 }
 

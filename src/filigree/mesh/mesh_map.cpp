@@ -1,8 +1,6 @@
-#include "filigree/scene/mesh_map.h"
+#include "filigree/mesh/mesh_map.h"
 
 #include <algorithm>
-
-#include <fmt/format.h>
 
 namespace filigree {
 
@@ -21,10 +19,12 @@ MapName split_name(std::string_view from) {
 }
 
 Error lacks(std::string_view from, const std::string& instead) {
-    return {ErrorCode::unsuitable, fmt::format("The mesh has nothing for '{}'; it has {}.", from, instead)};
+    return {ErrorCode::unsuitable, "The mesh has nothing for '" + std::string(from) + "'; it has " + instead + "."};
 }
 std::string listed(const std::vector<std::string>& names, std::string_view what) {
-    return names.empty() ? fmt::format("no {}s", what) : fmt::format("the {}s {}", what, fmt::join(names, ", "));
+    std::string list = (names.empty() ? "no " : "the ") + std::string(what) + "s";
+    for (std::size_t n = 0; n < names.size(); ++n) list += (n == 0 ? " " : ", ") + names[n];
+    return list;
 }
 
 Result<std::vector<float>> scalar_map(const Mesh& mesh, std::string_view from, std::string_view name) {
@@ -70,9 +70,9 @@ std::string check_mesh_map(std::string_view from) {
     const MapName name = split_name(from);
     const bool is_named = std::ranges::find(kNamed, name.kind) != kNamed.end() && !name.name.empty();
     if (is_color || is_named) return "";
-    return fmt::format("'{}' names no numbers of a mesh; write color.r (or g, b, a), scalar NAME, group NAME, object "
-                       "NAME or material NAME",
-                       from);
+    return "'" + std::string(from) +
+           "' names no numbers of a mesh; write color.r (or g, b, a), scalar NAME, group NAME, object NAME or material "
+           "NAME";
 }
 
 Result<std::vector<float>> mesh_map(const Mesh& mesh, std::string_view from) {
