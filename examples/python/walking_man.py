@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """Writes a heavy man with a skeleton and two clips, Walk and Jump, as a GLB that any viewer plays.
 
-    python3 walking_man.py [man.glb] [--fine]
+    python3 walking_man.py [man.glb] [--fine] [--relief]
 
 His body is a smooth union of capsules around the bones, meshed by surface nets; weights fall off with the distance from
-the bones. --fine: about 60,000 vertices instead of 8,000. Needs numpy. Feed the file to `filigree flesh`.
+the bones. --fine: about 60,000 vertices instead of 8,000. --relief: about 130,000, with bumps on his skin. Needs numpy.
+Feed the file to `filigree flesh`. creature.py makes another character with the same functions.
 """
 import json
 import struct
@@ -55,9 +56,9 @@ def body_distance(points):
     return least[..., 0] - blend * np.log(np.exp((least - d) / blend).sum(-1))
 
 
-def surface_net(step):
+def surface_net(step, low=(-1.0, -0.1, -0.35), high=(1.0, 1.95, 0.45)):
     """A closed mesh of the zero set of body_distance: a vertex a cell, a quad an edge that crosses it."""
-    low, high = np.array([-1.0, -0.1, -0.35]), np.array([1.0, 1.95, 0.45])
+    low, high = np.array(low), np.array(high)
     counts = np.ceil((high - low) / step).astype(int)
     grid = np.stack(np.meshgrid(*[low[k] + step * np.arange(counts[k]) for k in range(3)], indexing="ij"), -1)
     value = np.stack([body_distance(plane) for plane in grid])
@@ -89,6 +90,19 @@ def surface_net(step):
         out = first[:-1, 1:-1, 1:-1][i, j, k]
         faces.append(np.where(out[:, None], quad, quad[:, ::-1]))
     return places, np.concatenate(faces)
+
+
+def bumps(places):
+    """The surface with bumps, 3 mm high and 4 cm apart, which end at his hands, feet and face."""
+    slope = np.stack([body_distance(places + 1e-3 * np.eye(3)[k]) - body_distance(places - 1e-3 * np.eye(3)[k])
+                      for k in range(3)], -1)
+    normals = slope / np.linalg.norm(slope, axis=1, keepdims=True)
+    x, y, z = 2 * np.pi * places.T / 0.04
+    wave = np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)
+    joint = joint_distances(places)
+    bare = [NAMES.index(name) for name in NAMES if name[-4:] in ("Head", "Hand", "Foot")]
+    near = np.clip((joint[:, bare].min(1) - 0.01) / 0.05, 0, 1)
+    return places + normals * (0.003 * np.tanh(1.5 * wave) * near * near * (3 - 2 * near))[:, None]
 
 
 # %% His motion
@@ -142,10 +156,9 @@ def jump(phase):
 
 
 # %% The file
-def main():
-    paths = [argument for argument in sys.argv[1:] if not argument.startswith("--")]
-    path, step = paths[0] if paths else "man.glb", 0.009 if "--fine" in sys.argv else 0.022
-    places, quads = surface_net(step)
+def write_character(path, name, places, quads, clips, skin_color, colors=None):
+    """clips: of each its name, a function of the phase that gives rotations by joint and the shift of the first joint,
+    its seconds and its number of keys. colors: of the vertices, linear, (n, 3)."""
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     distance = joint_distances(places)
     weight = np.exp(-np.maximum(distance - distance.min(1, keepdims=True), 0) / 0.02)
@@ -171,19 +184,19 @@ def main():
         return len(accessors) - 1
 
     where = {joint[0]: np.array(joint[2], float) for joint in JOINTS}
-    nodes = [{"name": "Man", "mesh": 0, "skin": 0}]
+    nodes = [{"name": name, "mesh": 0, "skin": 0}]
     first = len(nodes)
-    for name, parent, place, _ in JOINTS:
-        nodes.append({"name": name, "translation": (where[name] - (where[parent] if parent else 0)).tolist()})
-    for number, (name, parent, _, _) in enumerate(JOINTS):
+    for joint, parent, place, _ in JOINTS:
+        nodes.append({"name": joint, "translation": (where[joint] - (where[parent] if parent else 0)).tolist()})
+    for number, (joint, parent, _, _) in enumerate(JOINTS):
         if parent:
             nodes[first + NAMES.index(parent)].setdefault("children", []).append(first + number)
     binds = np.tile(np.eye(4, dtype=np.float32), (len(JOINTS), 1, 1))
-    for number, name in enumerate(NAMES):
-        binds[number, 3, :3] = -where[name]  # columns first
+    for number, joint in enumerate(NAMES):
+        binds[number, 3, :3] = -where[joint]  # columns first
 
     animations = []
-    for name, pose_at, seconds, keys in (("Walk", walk, 1.1, 34), ("Jump", jump, 1.6, 49)):
+    for clip, pose_at, seconds, keys in clips:
         moments = np.linspace(0, 1, keys)
         poses = [pose_at(phase) for phase in moments]
         clock = add((seconds * moments).astype(np.float32), "SCALAR", 5126, True)
@@ -197,23 +210,25 @@ def main():
         for joint in NAMES:
             values = [pose.get(joint, rotation(X, 0)) for pose, _ in poses]
             channel(joint, "rotation", values, "VEC4")
-        channel("Hips", "translation", [where["Hips"] + hips for _, hips in poses], "VEC3")
-        animations.append({"name": name, "samplers": samplers, "channels": channels})
+        channel(NAMES[0], "translation", [where[NAMES[0]] + shift for _, shift in poses], "VEC3")
+        animations.append({"name": clip, "samplers": samplers, "channels": channels})
 
     attributes = {
         "POSITION": add(places.astype(np.float32), "VEC3", 5126, True, 34962),
         "JOINTS_0": add(best.astype(np.uint8), "VEC4", 5121, target=34962),
         "WEIGHTS_0": add(of_best.astype(np.float32), "VEC4", 5126, target=34962),
     }
+    if colors is not None:
+        attributes["COLOR_0"] = add(colors.astype(np.float32), "VEC3", 5126, target=34962)
     indices = add(triangles.astype(np.uint32).reshape(-1), "SCALAR", 5125, target=34963)
-    look = {"baseColorFactor": [0.72, 0.47, 0.36, 1], "metallicFactor": 0, "roughnessFactor": 0.6}
+    look = {"baseColorFactor": [*skin_color, 1], "metallicFactor": 0, "roughnessFactor": 0.6}
     joints = list(range(first, first + len(JOINTS)))
     document = {
-        "asset": {"version": "2.0", "generator": "walking_man.py"},
+        "asset": {"version": "2.0", "generator": "Filigree's examples"},
         "scene": 0,
         "scenes": [{"nodes": [0, first]}],
         "nodes": nodes,
-        "meshes": [{"name": "Man", "primitives": [{"attributes": attributes, "indices": indices, "material": 0}]}],
+        "meshes": [{"name": name, "primitives": [{"attributes": attributes, "indices": indices, "material": 0}]}],
         "materials": [{"name": "Skin", "pbrMetallicRoughness": look}],
         "skins": [{"joints": joints, "skeleton": first, "inverseBindMatrices": add(binds, "MAT4", 5126)}],
         "animations": animations,
@@ -228,7 +243,18 @@ def main():
         file.write(struct.pack("<III", 0x46546C67, 2, 12 + 8 + len(text) + 8 + len(binary)))
         file.write(struct.pack("<II", len(text), 0x4E4F534A) + text)
         file.write(struct.pack("<II", len(binary), 0x004E4942) + binary)
-    print(f"{path}: {len(places):,} vertices, {len(JOINTS)} joints, clips Walk and Jump")
+    names = " and ".join(clip[0] for clip in clips)
+    print(f"{path}: {len(places):,} vertices, {len(JOINTS)} joints, clips {names}")
+
+
+def main():
+    paths = [argument for argument in sys.argv[1:] if not argument.startswith("--")]
+    step = 0.006 if "--relief" in sys.argv else 0.009 if "--fine" in sys.argv else 0.022
+    places, quads = surface_net(step)
+    if "--relief" in sys.argv:
+        places = bumps(places)
+    clips = [("Walk", walk, 1.1, 34), ("Jump", jump, 1.6, 49)]
+    write_character(paths[0] if paths else "man.glb", "Man", places, quads, clips, (0.72, 0.47, 0.36))
 
 
 if __name__ == "__main__":

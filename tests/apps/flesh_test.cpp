@@ -58,6 +58,55 @@ TEST_F(FleshCommand, OneClipBecomesAModel) {
     EXPECT_EQ(poses.frames.front().positions, poses.frames.back().positions);
 }
 
+TEST_F(FleshCommand, TheSurfaceOfASkinOrOfACacheIsFollowed) {
+    const Json by_surface =
+        json(flesh({"tube.gltf", "-o", "soft.fil", "--clip", "Bend", "--by-surface", "--joints", "40"}));
+    EXPECT_EQ(by_surface["clips"][0]["frames"], 31);
+    EXPECT_GT(double(by_surface["clips"][0]["skin_volume"][0]), 0.8);
+    EXPECT_LT(double(by_surface["clips"][0]["furthest"]), 0.1);
+    // The same as a cache of its mesh, which knows no clip.
+    const GltfScene scene = GltfScene::read(path("tube.gltf"), RunContext()).value();
+    Mesh rest = scene.mesh();
+    for (const Vec3f& p : rest.positions) rest.colors.push_back({p.x() > 0 ? 1.0f : 0.0f, 0, 0, 1});
+    ASSERT_TRUE(write_mesh(rest, path("tube.ply")).ok());
+    const MeshAnimation bend{&rest, 31, 30, [&](std::size_t frame, std::span<Vec3f> out) {
+                                 return scene.positions(0, double(frame) / 30, out, RunContext());
+                             }};
+    ASSERT_TRUE(write_animation(bend, path("tube.pc2")).ok());
+    const std::vector<std::string> cache = {"tube.pc2",  "--mesh",   "tube.ply", "--input-rate", "30", "-o",
+                                            "soft2.fil", "--joints", "40"};
+    const Json by_cache = json(flesh(cache));
+    EXPECT_EQ(by_cache["clips"][0]["name"], "tube");
+    EXPECT_NEAR(double(by_cache["clips"][0]["furthest"]), double(by_surface["clips"][0]["furthest"]), 2e-3);
+    std::vector<std::string> painted = cache;
+    painted.insert(painted.end(), {"--soft-from", "color.r"});
+    EXPECT_GT(double(json(flesh(painted))["clips"][0]["furthest"]), double(by_cache["clips"][0]["furthest"]) + 0.01);
+    const auto sentence = [&](std::vector<std::string> arguments) { return run(flesh(std::move(arguments))).err; };
+    EXPECT_NE(sentence({"tube.pc2", "-o", "x.fil"}).find("--mesh"), std::string::npos);
+    EXPECT_NE(sentence({"tube.gltf", "-o", "x.glb", "--soft-from", "color.r"}).find("no colours"), std::string::npos);
+    EXPECT_NE(sentence({"tube.gltf", "-o", "x.glb", "--soft-values", "0", "2"}).find("--soft-from"), std::string::npos);
+    EXPECT_NE(sentence({"tube.gltf", "-o", "x.glb", "--through", "upper"}).find("comma"), std::string::npos);
+}
+
+TEST_F(FleshCommand, TheFilesOwnSkeletonIsKeptBeside) {
+    json(flesh({"tube.gltf", "-o", "soft.glb", "--joints", "40", "--keep-skeleton", "--clip", "Bend"}));
+    const Result<std::string> bytes = read_file(path("soft.glb"));
+    ASSERT_TRUE(bytes.ok());
+    const std::size_t length = std::size_t(std::uint8_t((*bytes)[12])) + 256 * std::size_t(std::uint8_t((*bytes)[13])) +
+                               65536 * std::size_t(std::uint8_t((*bytes)[14]));
+    const Json document = Json::parse(bytes->substr(20, length));
+    std::size_t lower = 0, turns = 0;
+    for (std::size_t n = 0; n < document["nodes"].size(); ++n)
+        if (document["nodes"][n].value("name", "") == "lower") lower = n;
+    ASSERT_GT(lower, 0u);
+    ASSERT_EQ(document["animations"].size(), 1u);
+    for (const Json& channel : document["animations"][0]["channels"])
+        turns += channel["target"]["node"] == lower && channel["target"]["path"] == "rotation";
+    EXPECT_EQ(turns, 1u);
+    EXPECT_NE(run(flesh({"tube.gltf", "-o", "x.fil", "--clip", "Bend", "--keep-skeleton"})).err.find(".glb"),
+              std::string::npos);
+}
+
 TEST_F(FleshCommand, SaysWhatIsWrong) {
     const auto sentence = [&](std::vector<std::string> arguments) { return run(flesh(std::move(arguments))).err; };
     EXPECT_NE(

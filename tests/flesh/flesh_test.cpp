@@ -107,6 +107,145 @@ TEST(Flesh, SoftJointsHoldLess) {
               3 * measure(firm, simulate_flesh(firm, 0, kThirty).value()).furthest);
 }
 
+TEST(Flesh, AJointMayHaveACoreAndSpringsOfItsOwn) {
+    FleshOptions options = kSmall;
+    options.soft = {
+        {.pattern = "lower", .strength = 1, .core = 0, .frequency = 3, .surface_frequency = 3, .damping = 7}};
+    const Flesh flesh = Flesh::create(tube(kCoarse, 0.5, waving(40, 2)), options).value();
+    bool some_held = false;
+    for (std::size_t i = 0; i < flesh.body()->particle_count(); ++i) {
+        const float x = flesh.body()->rest[i].x(), frequency = flesh.follow().frequency[i];
+        some_held |= x < -0.15f && std::isinf(frequency);
+        if (x < 0.15f) continue;
+        EXPECT_NEAR(frequency, 3, 1e-4f);
+        EXPECT_NEAR(flesh.follow().damping[i], 7, 1e-4f);
+    }
+    EXPECT_TRUE(some_held);
+    options.soft[0].core = 2;
+    EXPECT_FALSE(Flesh::create(tube(kCoarse, 0.5, waving(40, 2)), options).ok());
+}
+
+TEST(Flesh, PaintedPlacesAreLoose) {
+    const auto skin = [] { return tube(kCoarse, 0.5, waving(40, 2)); };
+    FleshOptions options = kSmall;
+    for (const Vec3f& p : skin().mesh.positions) options.loose.push_back(p.x() > 0 ? 1.0f : 0.0f);
+    const Flesh painted = Flesh::create(skin(), options).value();
+    for (std::size_t i = 0; i < painted.body()->particle_count(); ++i) {
+        const float x = painted.body()->rest[i].x();
+        if (x < 0.2f) continue;
+        EXPECT_LT(painted.follow().frequency[i], 2) << x; // 10 Hz sqrt(0.02)
+        EXPECT_TRUE(std::isinf(painted.follow().leash[i]));
+    }
+    EXPECT_GT(painted.report().held, 5u);
+    options.loose.pop_back();
+    EXPECT_NE(Flesh::create(skin(), options).error().message.find("vertices"), std::string::npos);
+}
+
+/// A limb that the animation drives through another passes where that is asked for.
+TEST(Flesh, LimbsPassThroughEachOtherWhereTheyShould) {
+    const auto furthest = [](std::vector<JointContact> contacts) {
+        SkinnedMesh skin;
+        skin.mesh = make_box({0, 0, 0}, {0.6, 0.2, 0.2});
+        const Mesh other = make_box({0, 0.5, 0}, {0.6, 0.2, 0.2});
+        const auto first = Index(skin.mesh.vertex_count());
+        skin.mesh.positions.insert(skin.mesh.positions.end(), other.positions.begin(), other.positions.end());
+        for (std::size_t f = 0; f < other.face_count(); ++f) {
+            std::vector<Index> face(other.face(f).begin(), other.face(f).end());
+            for (Index& v : face) v += first;
+            skin.mesh.add_face(face);
+        }
+        skin.joints = {{.name = "below"}, {.name = "above", .parent = 0, .place = {0, 0.5, 0}}};
+        for (Index v = 0; v < skin.mesh.vertex_count(); ++v) {
+            skin.weights.joints.push_back(v < first ? 0 : 1);
+            skin.weights.weights.push_back(1);
+            skin.weights.first.push_back(v + 1);
+        }
+        skin.clips = {{"falls", 0.5}};
+        skin.transforms = [](std::size_t, double t, std::span<Eigen::Affine3d> out) {
+            out[0] = Eigen::Affine3d::Identity();
+            out[1] = Eigen::Affine3d(Eigen::Translation3d(Vec3d(0, -0.8 * std::min(t, 0.5), 0)));
+        };
+        FleshOptions options = kSmall;
+        options.contacts = std::move(contacts);
+        const Flesh flesh = Flesh::create(skin, options).value();
+        return measure(flesh, simulate_flesh(flesh, 0, kThirty).value()).furthest;
+    };
+    EXPECT_GT(furthest({}), 0.03);
+    EXPECT_LT(furthest({{"below", "above"}}), 0.01);
+    EXPECT_LT(furthest({{.first = "bel*", .second = "above"}}), 0.01);
+    EXPECT_GT(furthest({{"*", "*"}, {.first = "below", .second = "above", .touch = true}}), 0.03);
+    FleshOptions options = kSmall;
+    options.contacts = {{"upper", "hand"}};
+    EXPECT_NE(Flesh::create(tube(kCoarse, 0.2, waving(40, 2)), options).error().message.find("'hand'"),
+              std::string::npos);
+}
+
+/// The tube's skin, as a surface that moves by itself.
+MovingSurface surface_of(const SkinnedMesh& skin) {
+    return {
+        .rest = skin.mesh, .clips = skin.clips, .positions = [skin](std::size_t clip, double t, std::span<Vec3f> out) {
+            return clip_positions(skin, clip, t, out);
+        }};
+}
+
+TEST(Flesh, ASurfaceWithoutJointsIsFollowedToo) {
+    const SkinnedMesh tubes = tube(kCoarse, 0.5, waving(40, 2));
+    SkinnedMesh skin = skin_of_surface(surface_of(tubes), 100).value();
+    EXPECT_FALSE(skin.has_bones);
+    EXPECT_EQ(check_skin(skin), "");
+    std::vector<Eigen::Affine3d> transforms(skin.joints.size());
+    std::vector<Vec3f> found(skin.mesh.vertex_count()), wanted(found.size());
+    for (const double t : {0.0, 0.07, 0.125, 0.5}) { // patches carry the surface nearly as it goes
+        skin.transforms(0, t, transforms);
+        skin_positions(skin, transforms, found);
+        ASSERT_TRUE(clip_positions(skin, 0, t, wanted).ok());
+        double sum = 0;
+        for (std::size_t v = 0; v < found.size(); ++v) sum += double((found[v] - wanted[v]).squaredNorm());
+        EXPECT_LT(std::sqrt(sum / double(found.size())), t == 0 ? 1e-6 : 5e-3) << t;
+    }
+    FleshOptions options = kSmall;
+    const Flesh flesh = Flesh::create(skin, options).value();
+    EXPECT_GT(flesh.report().held, 5u);
+    EXPECT_LT(flesh.report().held, flesh.body()->particle_count() / 2);
+    const FleshClip clip = simulate_flesh(flesh, 0, kThirty).value();
+    EXPECT_EQ(clip.clamped_particles, 0u);
+    const FleshMeasure m = measure(flesh, clip);
+    EXPECT_GT(m.furthest, 1e-3);
+    EXPECT_LT(m.furthest, 0.15);
+    options.soft = {{"Tail*"}};
+    EXPECT_NE(Flesh::create(skin, options).error().message.find("without joints"), std::string::npos);
+    MovingSurface lost = surface_of(tubes);
+    lost.positions = [](std::size_t, double, std::span<Vec3f> out) -> Status {
+        std::ranges::fill(out, Vec3f::Constant(std::numeric_limits<float>::infinity()));
+        return Success{};
+    };
+    EXPECT_NE(skin_of_surface(std::move(lost), 100).error().message.find("not finite"), std::string::npos);
+}
+
+/// Cells that the skin turns inside out at the start would fly apart.
+TEST(Flesh, AFoldedStartIsSettled) {
+    const auto folded = [](double) { return std::pair(radians(150), 0.0); };
+    const Flesh flesh = Flesh::create(tube(kCoarse, 0.2, folded), kSmall).value();
+    std::vector<Eigen::Affine3d> transforms(2);
+    flesh.skin().transforms(0, 0, transforms);
+    Vectors targets;
+    flesh.targets(transforms, Vec3d::Zero(), targets, nullptr);
+    const auto least = [&](const Vectors& at) {
+        Simulation simulation =
+            Simulation::create(
+                {}, {{.body = flesh.body()}},
+                {.mode = StepMode::explicit_steps, .contacts_within_bodies = false, .automatic_rigid = false})
+                .value();
+        EXPECT_TRUE(simulation.set_positions(0, at).ok());
+        return simulation.inverted(0).least;
+    };
+    const Vectors settled = flesh.settled(targets);
+    EXPECT_LT(least(targets), 0.2f);
+    EXPECT_GT(least(settled), least(targets) + 0.1f);
+    for (std::size_t i = 0; i < targets.size(); ++i)
+        EXPECT_TRUE(!std::isinf(flesh.follow().frequency[i]) || settled[i] == targets[i]);
+}
+
 /// A joint that grows carries hard matter; one that vanishes or is mirrored carries none.
 TEST(Flesh, JointsThatChangeTheirSizeAreHeldOrLeftOut) {
     const auto scaled = [](const Vec3d& by) {

@@ -218,6 +218,59 @@ TEST(Targets, SameBytesForAnyThreadsAndAfterARestore) {
     EXPECT_EQ(refused.error().code, ErrorCode::mismatch);
 }
 
+/// Springs, moving least squares, and cells that yield.
+TEST(Targets, OtherElasticModelsFollowToo) {
+    Material yielding = material(MaterialModel::fem, 2e4);
+    yielding.yield_stress = 2e3;
+    for (const Material& of :
+         {material(MaterialModel::springs, 2e4), material(MaterialModel::meshfree, 2e4), yielding}) {
+        const int model = int(of.model);
+        Following swings(block(3, 3, 3, 0.1, of), stands, 2);
+        swings.follow.damping = {0};
+        swings.follow.leash = {kHeld};
+        swings.begin();
+        Vectors aside = swings.at(0);
+        for (float& x : aside.x) x += 0.1f;
+        ASSERT_TRUE(swings.sim().set_positions(0, aside).ok());
+        for (int frame = 1; frame <= 30; ++frame) {
+            swings.step();
+            EXPECT_NEAR(centre_of_mass(swings.sim()).x(), 0.1 * std::cos(4 * std::numbers::pi * frame / 60), 2e-3)
+                << model;
+        }
+        Following arm_swings(block(2, 8, 2, 0.05, of), swinging(2, 0.5), 6, kElastic, free_space(), -0.1f);
+        arm_swings.begin();
+        for (int frame = 1; frame <= 40; ++frame) {
+            const FrameReport report = arm_swings.step();
+            EXPECT_EQ(report.clamped_particles, 0u) << model;
+            EXPECT_EQ(report.unstable_substeps, 0u) << model;
+            const Vectors wanted = arm_swings.at(frame / 60.0), &found = arm_swings.sim().positions(0);
+            for (std::size_t i = 0; i < found.size(); ++i)
+                EXPECT_LT((wanted[i] - found[i]).norm(), arm_swings.follow.frequency[i] == kHeld ? 1e-6f : 0.1f)
+                    << model;
+        }
+    }
+}
+
+TEST(Targets, GroupsThatPassDoNotTouch) {
+    const Motion folds = [](const Vec3d& rest, double t) { // the upper half comes down through the lower
+        return rest.y() > 0.05 ? Vec3d(rest - Vec3d(0, 0.3 * std::min(1.0, 4 * t), 0)) : rest;
+    };
+    const auto most_contacts = [&](bool pass) {
+        Following one(block(3, 10, 3, 0.05, material(MaterialModel::fem, 2e4)), folds, 20);
+        if (pass) {
+            for (std::size_t i = 0; i < one.body().particle_count(); ++i)
+                one.follow.groups.push_back(one.body().rest[i].y() > 0 ? 1 : 0);
+            one.follow.passing = {{0, 1}, {0, 0}, {1, 1}};
+        }
+        one.begin();
+        std::size_t most = 0;
+        for (int frame = 0; frame < 20; ++frame) most = std::max(most, one.step().contacts);
+        return most;
+    };
+    EXPECT_GT(most_contacts(false), 0u);
+    EXPECT_EQ(most_contacts(true), 0u);
+}
+
 TEST(Targets, WithoutAnEndTheyStop) {
     Following one(arm(), swinging(1, 0.5), kHeld);
     one.begin();
@@ -257,6 +310,9 @@ TEST(Targets, RefusesWhatCannotFollow) {
     wrong = one.follow;
     wrong.leash = {0};
     EXPECT_NE(code(one.sim().set_follow(0, wrong, at, at)).find("leash"), std::string::npos);
+    wrong = one.follow;
+    wrong.passing = {{0, 1}};
+    EXPECT_NE(code(one.sim().set_follow(0, wrong, at, at)).find("groups"), std::string::npos);
     Vectors lost = at;
     lost.x[1] = std::numeric_limits<float>::quiet_NaN();
     EXPECT_NE(code(one.sim().set_follow(0, one.follow, lost, at)).find("particle 1"), std::string::npos);

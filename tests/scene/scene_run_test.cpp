@@ -1,3 +1,4 @@
+#include "flesh/skinned_gltf.h"
 #include "scene/scenes.h"
 #include "threads.h"
 
@@ -44,6 +45,53 @@ TEST_F(SceneRunTest, ASceneInOneCallMovesAsARunFrameByFrame) {
     RunContext cancelled;
     cancelled.cancel();
     EXPECT_EQ(simulate_scene(dropped, cancelled).error().code, ErrorCode::cancelled);
+}
+
+/// Up, and to the side where it is put.
+TEST_F(SceneRunTest, ABodyFollowsACharacter) {
+    ASSERT_TRUE(write_file(beside("tube.gltf"), filigree_test::skinned_tube()).ok());
+    const std::string text = "[simulation]\nframes = 30\nframes_per_second = 30\n[[body]]\nmesh = \"tube.gltf\"\n"
+                             "material = \"jelly\"\nparticles = 300\ncentre = [5, 1, 0]\n"
+                             "rotate = { axis = [0, 1, 0], degrees = 90 }\n[[follow]]\nclip = \"Bend\"\n";
+    const auto run = made(text + "[[follow.joint]]\nname = \"low*\"\nfrequency = 8\n"
+                                 "[[follow.contact]]\nfirst = \"upper\"\nsecond = \"lower\"\n");
+    EXPECT_EQ(run->scene.follows[0].joints[0].soft.strength, 1);
+    EXPECT_FALSE(run->scene.follows[0].contacts[0].limbs.touch);
+    ASSERT_TRUE(run->run->advance_to(15, kOneThread));
+    const std::string state = run->run->save();
+    ASSERT_TRUE(run->run->advance_to(30, kOneThread));
+    EXPECT_FALSE(run->run->broke_down());
+    // The lower half turns up by a quarter, about the middle of the tube.
+    const Mesh last = run->run->mesh(0, 30, kOneThread).value();
+    const Mesh& rest = run->ready.bodies[0].model.mesh;
+    for (std::size_t v = 0; v < last.vertex_count(); ++v) {
+        const Vec3f at = rest.positions[v];
+        if (std::abs(at.x()) < 0.2f) continue;
+        const Vec3f wanted =
+            at.x() < 0 ? Vec3f(5 + at.z(), 1 + at.y(), -at.x()) : Vec3f(5 + at.z(), 1 + at.x(), at.y());
+        EXPECT_LT((last.positions[v] - wanted).norm(), 0.12f) << at.transpose();
+    }
+    const auto resumed = made(text + "[[follow.joint]]\nname = \"low*\"\nfrequency = 8\n"
+                                     "[[follow.contact]]\nfirst = \"upper\"\nsecond = \"lower\"\n");
+    ASSERT_TRUE(resumed->run->resume(state, "state").ok());
+    ASSERT_TRUE(resumed->run->advance_to(30, kOneThread));
+    EXPECT_TRUE(resumed->run->save() == run->run->save());
+
+    const auto refused = [&](const std::string& scene_text) {
+        const Result<SceneFile> read = read_scene(write(scene_text));
+        if (!read) return read.error().message;
+        const Result<ReadyScene> ready = set_up(*read, kOneThread);
+        return ready ? std::string() : ready.error().message;
+    };
+    EXPECT_NE(refused(text + "clip = 3\n").find(":11:"), std::string::npos);
+    EXPECT_NE(refused(text + "[[follow.joint]]\nname = \"hand\"\n").find("'upper', 'lower'"), std::string::npos);
+    EXPECT_NE(refused(text + "[[follow.joint]]\nstrong = 1\n").find("[[follow.joint]]"), std::string::npos);
+    EXPECT_NE(refused(text + "[[follow.limb]]\nname = \"hand\"\n").find("limb"), std::string::npos);
+    EXPECT_NE(refused(text + "[[fracture]]\n").find("[[fracture]]"), std::string::npos);
+    EXPECT_NE(refused("[[body]]\nshape = \"bar\"\n[[follow]]\n").find("animation"), std::string::npos);
+    EXPECT_NE(refused("[[body]]\nmesh = \"tube.gltf\"\nmaterial = \"wax\"\n[[follow]]\n").find("fem"),
+              std::string::npos);
+    EXPECT_NE(refused("[[body]]\nmesh = \"tube.gltf\"\n[[follow]]\nclip = \"Run\"\n").find("'Run'"), std::string::npos);
 }
 
 TEST_F(SceneRunTest, MapsSayWhatVariesInABody) {

@@ -153,6 +153,9 @@ class Flesh:
         damping: float = 3.0,
         soft: Sequence[str] = (),
         strength: float = 0.02,
+        loose: ArrayLike | None = None,
+        through: Sequence[tuple[str, str]] = (),
+        separate: bool = False,
         scale: float | None = None,
         sculpted_gravity: bool = True,
         clips: Sequence[str | int] | None = None,
@@ -828,7 +831,15 @@ def read_poses(
     threads: int = 0,
     progress: _Progress | None = None,
 ) -> PoseSequence: ...
-def read_skin(path: _Path, *, threads: int = 0, progress: _Progress | None = None) -> Skin: ...
+def read_skin(
+    path: _Path,
+    *,
+    mesh: _MeshLike | None = None,
+    by_surface: bool = False,
+    frames_per_second: float | None = None,
+    threads: int = 0,
+    progress: _Progress | None = None,
+) -> Skin: ...
 def remesh(
     mesh: _MeshLike,
     quads: int = 50000,

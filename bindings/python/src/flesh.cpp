@@ -51,9 +51,13 @@ std::vector<Vec3d> in_world(std::span<const Vec3f> positions, const Vec3d& origi
     return world;
 }
 
-PySkin read(const std::filesystem::path& path, unsigned threads, const py::object& progress) {
-    SkinnedMesh skin =
-        LongCall{threads, progress}([&](const RunContext& context) { return read_skin(path, context).value(); });
+PySkin read(const std::filesystem::path& path, const py::object& mesh, bool by_surface,
+            std::optional<double> frames_per_second, unsigned threads, const py::object& progress) {
+    const MeshPtr rest = mesh.is_none() ? nullptr : mesh_of(mesh);
+    const CharacterOptions options{
+        .rest = rest.get(), .by_joints = !by_surface, .frames_per_second = frames_per_second};
+    SkinnedMesh skin = LongCall{threads, progress}(
+        [&](const RunContext& context) { return read_character(path, options, context).value(); });
     warn(skin.warnings);
     const auto kept = std::make_shared<const SkinnedMesh>(std::move(skin));
     return {kept, std::make_shared<Mesh>(kept->mesh)};
@@ -73,16 +77,17 @@ py::array_t<double> skin_transforms(const PySkin& self, const py::object& clip, 
 }
 
 py::array_t<double> plain_positions(const PySkin& self, const py::object& clip, double seconds) {
-    const std::vector<Eigen::Affine3d> transforms = transforms_of(*self.skin, clip, seconds);
     std::vector<Vec3f> positions(self.skin->mesh.vertex_count());
-    skin_positions(*self.skin, transforms, positions, short_context(1));
+    if (Status placed = clip_positions(*self.skin, clip_of(*self.skin, clip), seconds, positions, short_context(1));
+        !placed)
+        throw BadResultAccess(placed.error());
     return take(in_world(positions, self.skin->mesh.origin));
 }
 
 PyFlesh make_flesh(const PySkin& skin, std::size_t particles, double stiffness, double density, double core,
                    double frequency, double surface_frequency, double damping, const py::object& soft, double strength,
-                   std::optional<double> scale, bool sculpted_gravity, const py::object& clips, unsigned threads,
-                   const py::object& progress) {
+                   const py::object& loose, const py::object& through, bool separate, std::optional<double> scale,
+                   bool sculpted_gravity, const py::object& clips, unsigned threads, const py::object& progress) {
     FleshOptions options;
     options.particles = particles;
     options.material.young_modulus = stiffness;
@@ -97,6 +102,13 @@ PyFlesh make_flesh(const PySkin& skin, std::size_t particles, double stiffness, 
         options.scale = *scale;
     }
     for (const py::handle pattern : py::list(soft)) options.soft.push_back({pattern.cast<std::string>(), strength});
+    if (!loose.is_none()) options.loose = values_of(loose, "loose");
+    options.loose_strength = strength;
+    for (const py::handle pair : py::list(through)) {
+        const auto names = pair.cast<std::pair<std::string, std::string>>();
+        options.contacts.push_back({names.first, names.second});
+    }
+    options.separate = separate;
     std::vector<std::size_t> numbers;
     if (!clips.is_none())
         for (const py::handle clip : py::list(clips)) numbers.push_back(clip_of(*skin.skin, clip));
@@ -226,16 +238,29 @@ What the joints do to the bind pose at a moment of a clip (its name or number): 
 
 Where plain skinning has the vertices at a moment of a clip (its name or number): (n, 3), world.
 )");
-    m.def("read_skin", &read, py::arg("path"), py::kw_only(), py::arg("threads") = 0, py::arg("progress") = py::none(),
-          R"(read_skin(path, *, threads=0, progress=None)
+    m.def("read_skin", &read, py::arg("path"), py::kw_only(), py::arg("mesh") = py::none(),
+          py::arg("by_surface") = false, py::arg("frames_per_second") = py::none(), py::arg("threads") = 0,
+          py::arg("progress") = py::none(),
+          R"(read_skin(path, *, mesh=None, by_surface=False, frames_per_second=None, threads=0, progress=None)
 --
 
-Read the skins of an animated glTF as one: a Skin, for `Flesh`.
+Read any file that moves as a Skin, for `Flesh`: an animated glTF by its skins, which become one, or by its morph
+targets where it has no skin; a model with poses (.fil); with `mesh` a point cache or numbered meshes.
+
+Parameters
+----------
+path : str or Path
+mesh : Mesh, optional
+    At rest, for files that have positions alone.
+by_surface : bool
+    Take a skin as a moving surface too, so that its morph targets move as well.
+frames_per_second : float, optional
+    Of files that do not say it; None: 60.
 
 Raises
 ------
 UnsuitableError
-    It has no skin, or no animation.
+    Nothing moves in it.
 )");
     py::class_<PyFlesh>(
         m, "Flesh",
@@ -260,7 +285,13 @@ damping : float
 soft : sequence of str
     Patterns of joints that hold little, with all below them: ["Tail*"].
 strength : float
-    0 to 1: how strongly these hold.
+    0 to 1: how strongly these hold, and loose places.
+loose : array_like, (n,), optional
+    0 to 1, of the vertices of the skin's mesh: how loose the matter is.
+through : sequence of (str, str)
+    Pairs of joints whose limbs pass through each other, with all below them.
+separate : bool
+    Part what is nearer to each other than two particles, such as fingers.
 scale : float, optional
     Metres a model unit; None: 1, or the power of ten that makes 0.3 to 3 m.
 sculpted_gravity : bool
@@ -272,10 +303,11 @@ clips : sequence of str or int, optional
             py::init(&make_flesh), py::arg("skin"), py::kw_only(), py::arg("particles") = 5000,
             py::arg("stiffness") = 1.5e4, py::arg("density") = 1000.0, py::arg("core") = 0.5,
             py::arg("frequency") = 10.0, py::arg("surface_frequency") = 1.0, py::arg("damping") = 3.0,
-            py::arg("soft") = py::tuple(), py::arg("strength") = 0.02, py::arg("scale") = py::none(),
+            py::arg("soft") = py::tuple(), py::arg("strength") = 0.02, py::arg("loose") = py::none(),
+            py::arg("through") = py::tuple(), py::arg("separate") = false, py::arg("scale") = py::none(),
             py::arg("sculpted_gravity") = true, py::arg("clips") = py::none(), py::arg("threads") = 0,
             py::arg("progress") = py::none(),
-            R"(__init__(self, skin, *, particles=5000, stiffness=15000.0, density=1000.0, core=0.5, frequency=10.0, surface_frequency=1.0, damping=3.0, soft=(), strength=0.02, scale=None, sculpted_gravity=True, clips=None, threads=0, progress=None)
+            R"(__init__(self, skin, *, particles=5000, stiffness=15000.0, density=1000.0, core=0.5, frequency=10.0, surface_frequency=1.0, damping=3.0, soft=(), strength=0.02, loose=None, through=(), separate=False, scale=None, sculpted_gravity=True, clips=None, threads=0, progress=None)
 --
 
 )")

@@ -47,6 +47,26 @@ def test_flesh_follows_and_keeps_its_volume(skin):
     assert numpy.sqrt(((frames[12] - plain) ** 2).sum(1).mean()) < 0.05
 
 
+def test_flesh_is_loose_where_it_is_painted_and_limbs_pass(skin):
+    loose = (skin.mesh.world_vertices[:, 1] < 1.3).astype(float)
+    firm = filigree.Flesh(skin, particles=400, clips=["Walk"])
+    painted = filigree.Flesh(skin, particles=400, clips=["Walk"], loose=loose, through=[("*Hand", "Hips")])
+    assert numpy.isinf(painted.frequency).sum() < numpy.isinf(firm.frequency).sum()
+    with pytest.raises(filigree.UsageError, match="'Tail'"):
+        filigree.Flesh(skin, particles=400, through=[("Tail", "Hips")])
+
+
+def test_a_moving_surface_is_a_skin_too(tmp_path):
+    bar = filigree.make("bar", resolution=8)
+    frames = numpy.stack([bar.world_vertices + [0, 0.2 * numpy.sin(t / 4), 0] for t in range(20)])
+    filigree.write_animation(bar, frames, tmp_path / "bar.pc2")
+    skin = filigree.read_skin(tmp_path / "bar.pc2", mesh=bar, frames_per_second=24)
+    assert skin.clips[0][0] == "bar" and skin.clips[0][1] == pytest.approx(19 / 24)
+    assert numpy.allclose(skin.positions(0, 6 / 24), frames[6], atol=1e-5)
+    with pytest.raises(filigree.UnsuitableError, match="positions alone"):
+        filigree.read_skin(tmp_path / "bar.pc2")
+
+
 def test_a_body_follows_targets():
     body = filigree.Body(filigree.make("bar", resolution=4), "jelly", particles=200)
     simulation = filigree.Simulation([body], automatic_rigid=False, mode="explicit")

@@ -26,9 +26,10 @@ constexpr float kHeldStrength = 0.75f;         ///< of joints that hold their co
 constexpr float kFreeStrength = 0.1f;          ///< of joints that have no leash
 constexpr double kLeafReach = 1.5;             ///< times the way from a last joint to the middle of what it carries
 constexpr float kFolded = 0.3f, kWhole = 0.7f; ///< volume of a cell that the joints alone leave: from free to held
-constexpr float kThinDepth = 0.9f;             ///< spacings
-constexpr int kThinReach = 3;                  ///< cells
-constexpr float kMainShare = 0.6f;             ///< weight of the joint that a particle belongs to
+constexpr int kSettledRings = 2, kSettlingSteps = 60;
+constexpr float kThinDepth = 0.9f;                          ///< spacings
+constexpr int kThinReach = 3;                               ///< cells
+constexpr float kMainShare = 0.6f;                          ///< weight of the joint that a particle belongs to
 constexpr std::size_t kFarInSkeleton = 4, kFewestGlued = 4; ///< joints, edges of the lattice
 constexpr std::size_t kMostMoments = 120;                   ///< of a clip that are looked at for scales
 
@@ -610,6 +611,56 @@ void Flesh::targets(std::span<const Eigen::Affine3d> transforms, const Vec3d& of
             if (accelerations) accelerations->set(i, turned(undone).cast<float>());
         }
     });
+}
+
+Vectors Flesh::settled(const Vectors& targets) const {
+    const auto& cells = body_->cells.cell_corners;
+    const auto h = float(body_->spacing());
+    const auto gradient = [&](const Vectors& at, std::size_t cell) {
+        Mat3f sum = Mat3f::Zero();
+        for (int corner = 0; corner < 8; ++corner)
+            for (int axis = 0; axis < 3; ++axis)
+                sum.col(axis) += (corner >> axis & 1 ? 0.25f : -0.25f) * at[cells[cell][corner]];
+        return Mat3f(sum / h);
+    };
+    std::vector<std::uint8_t> moves(targets.size());
+    const auto spread = [&](const auto& is_asked) {
+        std::vector<std::uint8_t> more = moves;
+        for (std::size_t c = 0; c < cells.size(); ++c)
+            if (is_asked(c))
+                for (const Index corner : cells[c]) more[corner] = 1;
+        moves = std::move(more);
+    };
+    const auto is_near = [&](std::size_t c) {
+        return std::ranges::any_of(cells[c], [&](Index corner) { return moves[corner]; });
+    };
+    spread([&](std::size_t c) { return gradient(targets, c).determinant() < kWhole; });
+    Vectors at = targets;
+    if (std::ranges::count(moves, 1) == 0) return at;
+    for (int ring = 0; ring < kSettledRings; ++ring) spread(is_near);
+    std::vector<std::size_t> active;
+    for (std::size_t c = 0; c < cells.size(); ++c)
+        if (is_near(c)) active.push_back(c);
+    std::vector<Vec3f> sums(targets.size());
+    std::vector<float> counts(targets.size());
+    for (int step = 0; step < kSettlingSteps; ++step) { // each cell draws its corners to where it is rigid
+        std::ranges::fill(sums, Vec3f::Zero());
+        std::ranges::fill(counts, 0.0f);
+        for (const std::size_t c : active) {
+            const Mat3f turn = nearest_rotation(gradient(at, c).cast<double>()).cast<float>();
+            Vec3f middle = Vec3f::Zero();
+            for (const Index corner : cells[c]) middle += 0.125f * at[corner];
+            for (int corner = 0; corner < 8; ++corner) {
+                const Vec3f from_middle(corner & 1 ? 0.5f : -0.5f, corner & 2 ? 0.5f : -0.5f,
+                                        corner & 4 ? 0.5f : -0.5f);
+                sums[cells[c][corner]] += middle + turn * (h * from_middle);
+                ++counts[cells[c][corner]];
+            }
+        }
+        for (std::size_t i = 0; i < sums.size(); ++i)
+            if (moves[i] && counts[i] > 0 && !std::isinf(follow_.frequency[i])) at.set(i, sums[i] / counts[i]);
+    }
+    return at;
 }
 
 } // namespace filigree

@@ -151,7 +151,7 @@ public:
         simulation_.emplace(std::move(*made));
         targets_.emplace(flesh_, made_.clip, made_.frames_per_second, last_, made_.is_loop, made_.offset, context_);
         made_.skin_gap = apart(targets_->at(0), targets_->at(last_), diagonal_).max;
-        if (Status begun = begin(targets_->at(0), true); !begun) return begun.error();
+        if (Status begun = begin(flesh_.settled(targets_->at(0)), true); !begun) return begun.error();
         std::vector<Vectors> before;
         const unsigned most = made_.is_loop ? std::max(options_.most_cycles, 2U) : 1;
         for (unsigned cycle = 1; cycle <= most; ++cycle) {

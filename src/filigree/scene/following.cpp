@@ -36,7 +36,7 @@ Vectors Following::velocities(double frame, const Vectors& now) {
 
 Status Following::begin(Simulation& simulation) {
     const Vectors start = targets(0, nullptr), speeds = velocities(0, start);
-    if (Status set = simulation.set_positions(number_, start); !set) return set;
+    if (Status set = simulation.set_positions(number_, flesh_.settled(start)); !set) return set;
     if (Status set = simulation.set_velocities(number_, speeds); !set) return set;
     return simulation.set_follow(number_, flesh_.follow(), start, speeds);
 }

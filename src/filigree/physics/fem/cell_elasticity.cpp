@@ -60,24 +60,41 @@ public:
         body_.material = body.material;
         body_.cells = lattice_cells(std::move(indices), cells.spacing, cells.origin);
         body_.fields = part_of(body.fields, own);
-        corner_of_.resize(body_.cells.corners.size());
+        std::vector<Index> corner_of(body_.cells.corners.size());
         for (Index c = 0; c < own.size(); ++c) {
             body_.cells.fraction[c] = cells.fraction[own[c]];
-            for (int n = 0; n < 8; ++n) corner_of_[body_.cells.cell_corners[c][n]] = cells.cell_corners[own[c]][n];
+            for (int n = 0; n < 8; ++n) corner_of[body_.cells.cell_corners[c][n]] = cells.cell_corners[own[c]][n];
         }
-        scratch_ = Vectors(corner_of_.size());
+        corners_ = corner_of.size();
+        scratch_ = Vectors(corners_);
+        for (Index c = 0; c < corners_; ++c) {
+            const bool goes_on = c > 0 && corner_of[c] == corner_of[c - 1] + 1;
+            if (!goes_on) stretches_.push_back({c, corner_of[c], 0});
+            ++stretches_.back().count;
+        }
     }
 
     const Body& body() const { return body_; }
     Vectors& forces() { return scratch_; }
-    Vectors gathered(const Vectors& from) const {
-        Vectors to(corner_of_.size());
-        for (std::size_t c = 0; c < corner_of_.size(); ++c) to.set(c, from[corner_of_[c]]);
+    /// The corners of this lattice where the body's are.
+    const Vectors& gathered(const Vectors& from, Vectors& to) const {
+        if (to.size() != corners_) to = Vectors(corners_);
+        for (const auto& axis : kVectorAxes)
+            for (const Stretch& s : stretches_)
+                std::copy_n((from.*axis).data() + s.own, s.count, (to.*axis).data() + s.first);
         return to;
     }
+    const Vectors& positions(const Vectors& from) { return gathered(from, positions_); }
+    const Vectors& velocities(const Vectors& from) { return gathered(from, velocities_); }
     void scatter(Vectors& to) const {
-        for (std::size_t c = 0; c < to.size(); ++c) to.set(c, Vec3f::Zero());
-        for (std::size_t c = 0; c < corner_of_.size(); ++c) to.add(corner_of_[c], scratch_[c]);
+        const std::size_t count = to.size();
+        for (const auto& axis : kVectorAxes) {
+            float* const sums = (to.*axis).data();
+            const float* const parts = (scratch_.*axis).data();
+            std::fill_n(sums, count, 0.0f);
+            for (const Stretch& s : stretches_)
+                for (Index k = 0; k < s.count; ++k) sums[s.own + k] += parts[s.first + k];
+        }
     }
 
 private:
@@ -105,8 +122,12 @@ private:
     }
 
     Body body_; ///< its cells and what they are made of
-    std::vector<Index> corner_of_;
-    Vectors scratch_;
+    struct Stretch {
+        Index first, own, count; ///< corners from `first` on are the body's from `own` on
+    };
+    std::vector<Stretch> stretches_;
+    std::size_t corners_ = 0;
+    Vectors scratch_, positions_, velocities_;
 };
 
 class CellElasticity final : public Elasticity {
@@ -152,9 +173,9 @@ private:
         InternalDamping inside;
         if (damping) {
             inside = *damping;
-            inside.velocities = stacked_->gathered(damping->velocities);
+            inside.velocities = stacked_->velocities(damping->velocities);
         }
-        const ElasticReport report = cell_kernel::forces(plan_, stacked_->gathered(positions), stacked_->forces(),
+        const ElasticReport report = cell_kernel::forces(plan_, stacked_->positions(positions), stacked_->forces(),
                                                          sums_, context, damping ? &inside : nullptr);
         stacked_->scatter(forces);
         return report;
