@@ -2,6 +2,8 @@
 //   fit_table [--error 1e-4] [--base N] [--choice rest|motion] [--frames 60] [--scan MESH] [--threads N] [NAME...]
 // A line each. Names: flag, rod, crumple, skin, bulges, fluid; scan-skin, scan-bulges and scan-warp move --scan MESH
 // (scan-warp bends, twists and distorts it; from a .pc2 file, as large scans are). Default: all.
+//   fit_table --animation FILE [--mesh REST] ...    fits a file: a glTF that moves, or a cache with its mesh
+//   fit_table --most-megabytes M ...    leaves with 1 where the memory at its peak is above M
 //   fit_table --write FOLDER NAME...    writes NAME.pc2 and NAME.obj there instead
 #include "../tests/fit/made_animations.h"
 
@@ -30,7 +32,8 @@ struct Options {
     FitOptions fit;
     std::size_t frames = 60;
     unsigned threads = 0;
-    std::string scan, folder;
+    std::string scan, folder, animation, mesh;
+    double most_megabytes = 0; ///< 0: any
     std::vector<std::string> names;
 };
 
@@ -49,11 +52,15 @@ Options read_options(int count, char** arguments) {
         if (name == "--frames") options.frames = std::size_t(std::atol(value.c_str()));
         if (name == "--threads") options.threads = unsigned(std::atoi(value.c_str()));
         if (name == "--scan") options.scan = value;
+        if (name == "--animation") options.animation = value;
+        if (name == "--mesh") options.mesh = value;
+        if (name == "--most-megabytes") options.most_megabytes = std::atof(value.c_str());
         if (name == "--write") options.folder = value;
         if (name == "--choice")
             for (const DriverChoice choice : {DriverChoice::rest, DriverChoice::motion})
                 if (name_of(choice) == value) options.fit.choice = choice;
     }
+    if (!options.animation.empty()) options.names.push_back(fs::path(options.animation).stem().string());
     if (options.names.empty()) options.names = {"flag", "rod", "crumple", "skin", "bulges", "fluid"};
     return options;
 }
@@ -98,8 +105,17 @@ void write(const MadeAnimation& made, const std::string& name, const fs::path& f
     (void)write_animation(made.animation, folder / (name + ".pc2")).value();
 }
 
+/// The mesh at rest: of --mesh, or of the glTF itself.
+MadeAnimation open_file(const Options& options) {
+    const std::string& rest = options.mesh.empty() ? options.animation : options.mesh;
+    MadeAnimation made{std::make_shared<Mesh>(read_mesh(rest).value().mesh), {}};
+    made.animation = open_animation(options.animation, *made.rest).value();
+    return made;
+}
+
 void run(const std::string& name, const Options& options) {
-    const std::optional<MadeAnimation> made = make(name, options);
+    const bool is_file = !options.animation.empty() && name == options.names.back();
+    const std::optional<MadeAnimation> made = is_file ? open_file(options) : make(name, options);
     if (!made) {
         std::printf("%-12s needs --scan MESH, or is not known\n", name.c_str());
         return;
@@ -120,7 +136,8 @@ void run(const std::string& name, const Options& options) {
         const fs::path packed = folder / "packed.fil", glb = folder / "skin.glb";
         const unsigned bits = options.fit.error < 9e-5 ? 16 : 14;
         (void)pack_model(fitted->model, fitted->poses, {.bits = bits}, packed).value();
-        (void)write_skin_glb(fitted->model, frames_of(fitted->poses), {.compress = true}, glb).value();
+        (void)write_skin_glb(fitted->model, frames_of(fitted->poses), {.compress = true, .key_error = report.rms}, glb)
+            .value();
         std::printf(
             "%-12s %8zu x %-4zu %-6s %6zu  %8.2e %8.2e  %5.2f %5.2f  %9.0f %8.0f %8.0f  %5.0f  %2zu  %6.1f %6.1f "
             "%5.0f\n",
@@ -144,4 +161,8 @@ int main(int count, char** arguments) {
                     "vertices", "fr.", "choice", "driver", "rms", "max", "n.avg", "n.p95", "PC2 kB", "GLB kB", "packed",
                     "times", "#", "s", "cpu s", "MB");
     for (const std::string& name : options.names) run(name, options);
+    if (options.most_megabytes > 0 && peak_megabytes() > options.most_megabytes) {
+        std::printf("%.0f MB at most are above %.0f\n", peak_megabytes(), options.most_megabytes);
+        return 1;
+    }
 }

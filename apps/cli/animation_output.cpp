@@ -129,6 +129,10 @@ OptionList animation_options(AnimationOutput& output) {
                "Skin: rotations and weights as floats, not as 16-bit numbers"),
         Option("--compress", output.compress,
                "GLB: packed for the web; the viewer needs EXT_meshopt_compression and KHR_mesh_quantization"),
+        Option("--key-error", output.key_error,
+               "Skin with --compress: how far rounded and fewer keys may move a vertex at a key, fraction of the "
+               "diagonal (default: 1e-05; fit: its rms error)")
+            .between(1e-9, 0.1),
         Option("--all-levels", output.skin.all_levels, "Skin: also write the coarser levels (MSFT_lod)"),
         Option("--no-normals", output.no_normals,
                "GLB: write no normals. Viewers then shade flat, which is right under stretch too"),
@@ -137,7 +141,7 @@ OptionList animation_options(AnimationOutput& output) {
 
 std::string given_animation_option(const Session& session) {
     return session.first_given({"--as", "--key-rate", "--interpolation", "--influences", "--full-precision",
-                                "--all-levels", "--compress", "--no-normals", "--morph-normals"});
+                                "--all-levels", "--compress", "--key-error", "--no-normals", "--morph-normals"});
 }
 
 bool is_animation_path(const std::string& path) { return animation_format(path_of(path)).ok(); }
@@ -155,6 +159,8 @@ void check_animation_options(const std::vector<std::string>& paths, const Sessio
     const std::string given = given_animation_option(session);
     if (!given.empty() && std::none_of(paths.begin(), paths.end(), is_glb))
         refuse(given + " belongs to an animation that goes to a .glb.");
+    if (!session.first_given({"--key-error"}).empty() && session.first_given({"--compress"}).empty())
+        refuse("--key-error belongs to --compress.");
 }
 
 void check_not_input(const std::string& output, const std::vector<std::string>& inputs) {
@@ -233,6 +239,7 @@ void write_animation_output(const Model& model, const FrameSource<Pose>& poses, 
         SkinOptions options = output.skin;
         if (output.no_normals) options.normals = ExportNormals::leave;
         options.compress = output.compress;
+        options.key_error = output.key_error.value_or(options.key_error);
         options.restore = restore;
         options.materials_beside = path_of(materials_beside);
         session.begin_writing(path);

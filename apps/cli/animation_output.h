@@ -17,12 +17,13 @@ enum class GlbMotion { automatic, skin, morph };
 struct AnimationOutput {
     GlbMotion glb = GlbMotion::automatic;
     bool no_normals = false, compress = false;
+    std::optional<double> key_error; ///< of SkinOptions
     SkinOptions skin; ///< its normals as no_normals says
     MorphOptions morph;
 };
 
-/// --as, --key-rate, --interpolation, --influences, --full-precision, --all-levels, --compress, --no-normals and
-/// --morph-normals.
+/// --as, --key-rate, --interpolation, --influences, --full-precision, --compress, --key-error, --all-levels,
+/// --no-normals and --morph-normals.
 OptionList animation_options(AnimationOutput& output);
 /// The first of these options that was given; empty: none was.
 std::string given_animation_option(const Session& session);

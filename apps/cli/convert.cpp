@@ -40,7 +40,7 @@ bool moves(const ConvertArguments& options, Session& session) {
     const std::string& input = options.files.input;
     std::error_code ignored;
     if (fs::is_directory(path_of(input), ignored) || numbered_name(path_of(input)) ||
-        is_one_of(input, {".pc2", ".mdd", ".abc"}))
+        is_one_of(input, {".pc2", ".mdd", ".abc"}) || is_usd(path_of(input)))
         return true;
     if (is_one_of(input, {".fil"})) {
         PoseSequence poses;
@@ -128,7 +128,7 @@ Command convert_command() {
             OptionList{
                 Option("input", options->files.input,
                        "Mesh (.obj, .ply, .stl, .off, .glb, .gltf), animation (.pc2, .mdd, an animated glTF, "
-                       "NAME_####.ply, a folder of numbered meshes) or model (.fil)")
+                       ".usda, NAME_####.ply, a folder of numbered meshes) or model (.fil)")
                     .is_read()
                     .required(),
                 Option("output", options->output,

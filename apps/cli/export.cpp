@@ -43,9 +43,9 @@ void export_levels(const Model& model, const ExportArguments& options, Session& 
                options.input + (options.at_rest ? ": a" : ": has no poses, and a") +
                    " model at rest goes to .glb, or with --web to a folder with a page; 'filigree simulate' makes "
                    "poses, and --poses takes another program's.");
-    const std::string given =
-        session.first_given({"--as", "--key-rate", "--interpolation", "--influences", "--full-precision", "--compress",
-                             "--no-normals", "--morph-normals", "--level", "--frame-rate", "--animation", "--pose-up"});
+    const std::string given = session.first_given(
+        {"--as", "--key-rate", "--interpolation", "--influences", "--full-precision", "--compress", "--key-error",
+         "--no-normals", "--morph-normals", "--level", "--frame-rate", "--animation", "--pose-up"});
     if (!given.empty())
         refuse(given + " belongs to a model that moves, and " + options.input +
                " is exported at rest; 'filigree level' writes one level of it.");

@@ -1,6 +1,7 @@
 #include "moving_input.h"
 
 #include "filigree/io/animation/pose_match.h"
+#include "filigree/io/animation/usd_scene.h"
 #include "filigree/io/gltf/gltf.h"
 #include "filigree/io/model/model_file.h"
 #include "filigree/io/system/extension.h"
@@ -64,9 +65,10 @@ void open_moving_input(const MovingFiles& files, Session& session, MovingInput& 
         session.warn(scene.warnings());
         input.rest = scene.mesh();
         input.joints = scene.joint_count();
-    } else if (extension == ".abc") {
-        refuse(ErrorCode::unsupported, files.input + ": Alembic is not read; in Blender, import it and export .pc2 "
-                                                     "(add-on NewTek MDD or PC2) or an animated .glb.");
+    } else if (is_usd(path_of(files.input))) {
+        input.rest = require(read_usd_mesh(path_of(files.input)));
+    } else if (const std::optional<Error> error = alembic_error(path_of(files.input))) {
+        refuse(error->code, error->message);
     } else {
         refuse(files.input + ": has positions alone; --mesh FILE gives the mesh that it moves.");
     }

@@ -34,7 +34,8 @@ struct MovingInput {
 /// The first mesh of a sequence, for its faces.
 Mesh first_mesh(const std::string& path, Session& session);
 
-/// Throws a Failure where nothing moves: .pc2, .mdd, numbered meshes, an animated glTF or a model with poses do.
+/// Throws a Failure where nothing moves: .pc2, .mdd, numbered meshes, an animated glTF, USD text or a model
+/// with poses do.
 void open_moving_input(const MovingFiles& files, Session& session, MovingInput& input);
 
 } // namespace filigree::cli

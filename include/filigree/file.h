@@ -156,7 +156,7 @@ Result<AnimationFormat> animation_format(const std::filesystem::path& path);
 
 struct PoseFileOptions {
     /// The rate of files that do not say one (PC2, numbered; unset: 60), and instead of the rate of an MDD or a .fil. A
-    /// PC2's sample rate divides it. glTF: how many frames a second to take.
+    /// PC2's sample rate divides it. glTF, USD: how many frames a second to take.
     std::optional<double> frames_per_second = {};
     std::string animation = {}; ///< glTF: name of the animation; empty: the first
     /// The axis that is up in the file, y or z, where it is the other one in the model: poses are turned.
@@ -170,8 +170,8 @@ struct PoseFileOptions {
 };
 
 /// Opens poses of a driver that another program moved: PC2, MDD, numbered meshes (with gradients where a PLY has f00 ..
-/// f22), an animated glTF, or the poses of a .fil. Frames are read when they are asked for; one is in memory (.fil:
-/// all). An MDD with uneven times needs a frame rate. Numbered meshes after the first are checked when they are
+/// f22), an animated glTF, USD text, or the poses of a .fil. Frames are read when they are asked for; one is in memory
+/// (.fil: all). An MDD with uneven times needs a frame rate. Numbered meshes after the first are checked when they are
 /// fetched. points: number of the driver's vertices. origin: the mesh's. Errors: not_found, bad_file, mismatch (another
 /// number of points), unsupported (also a pipe), usage (no such animation; several sequences in a folder).
 Result<FrameSource<Pose>> open_poses(const std::filesystem::path& path, std::size_t points, const Vec3d& origin,
@@ -264,7 +264,10 @@ struct SkinOptions {
     unsigned influences = 3;
     bool full_precision = false; ///< float rotations and weights; else int16 and uint16, 3e-6 of the diagonal
     bool compress = false;       ///< EXT_meshopt_compression and KHR_mesh_quantization, which viewers have to know
-    bool all_levels = false;     ///< coarser levels too, as MSFT_lod, on the same joints
+    /// With compress, linear keys and without full_precision: how far a vertex may be moved at a key by rounding the
+    /// keys and leaving keys out, fraction of the driver's diagonal; above 0, at most 0.1.
+    double key_error = 1e-5;
+    bool all_levels = false; ///< coarser levels too, as MSFT_lod, on the same joints
     ExportNormals normals = ExportNormals::keep;
     std::filesystem::path materials_beside = {}; ///< path of the mesh or model: libraries are looked for beside it
     /// Path of a glTF whose nodes, without their meshes, and cameras are put beside the skin, with what its animations

@@ -60,6 +60,11 @@ filigree('export', 'sphere_moved.fil', '-o', 'near_page', '--web', '--stream', '
 filigree('restore', 'stream_page/model.fil', '--frame', String(kFrames), '-o', 'stream_last.obj');
 filigree('export', ...moving, '-o', 'compressed.glb', '--compress');
 
+// What was moved, fitted anew: every program has to show what the fit restores.
+filigree('fit', 'moving.pc2', '--mesh', 'cube.ply', '--frame-rate', String(kRate), '--base', '100', '-o', 'fitted.fil',
+    '-o', 'fitted.glb', '--full-precision');
+filigree('restore', 'fitted.fil', '--frames', '-o', 'fitted.pc2');
+
 // Two objects, two materials and a UV seam: a tube of which each half is an object, its texture's ends at one edge.
 function tube(around, rings, library) {
     const lines = [`mtllib ${library}`];

@@ -11,7 +11,7 @@ using namespace filigree_fuzz;
 
 namespace {
 
-constexpr const char* kNames[] = {".pc2", ".mdd", ".glb", ".fil"};
+constexpr const char* kNames[] = {".pc2", ".mdd", ".glb", ".fil", ".usda"};
 
 } // namespace
 
@@ -29,10 +29,10 @@ std::vector<std::string> seeds() {
         std::ranges::copy(mesh.positions, positions.begin());
         return Success{};
     };
-    for (char k = 0; k < 3; ++k) {
+    for (const int k : {0, 1, 2, 4}) {
         const TemporaryFile file(kNames[std::size_t(k)]);
         if (write_animation(animation, file.path(), kContext))
-            all.push_back(std::string({k, char(mesh.vertex_count())}) + file.bytes());
+            all.push_back(std::string({char(k), char(mesh.vertex_count())}) + file.bytes());
     }
     return all;
 }

@@ -99,6 +99,27 @@ TEST_F(GltfExport, SkinPlaysWhatWeRestore) {
         }
 }
 
+TEST_F(GltfExport, CompressedKeysKeepTheErrorAskedFor) {
+    const PoseSequence poses = make_poses(wavy_model(), 25, 24);
+    std::size_t before = skin(wavy_model(), poses).bytes;
+    for (const double error : {1e-6, 1e-5, 1e-4, 1e-3}) {
+        const ExportReport report = skin(wavy_model(), poses, {.compress = true, .key_error = error});
+        EXPECT_LE(report.error_at_keys, error + 7e-6) << "positions are rounded too";
+        EXPECT_LT(report.bytes, before) << error;
+        before = report.bytes;
+        const json file = document(this->file());
+        std::vector<std::string> filters;
+        for (const json& view : file["bufferViews"])
+            if (view.contains("extensions"))
+                filters.push_back(view["extensions"]["EXT_meshopt_compression"].value("filter", ""));
+        for (const char* filter : {"EXPONENTIAL", "QUATERNION"})
+            EXPECT_EQ(std::ranges::count(filters, filter), 1) << filter;
+    }
+    for (const double error : {0.0, 0.2, double(NAN)})
+        EXPECT_EQ(write_skin_glb(wavy_model(), frames_of(poses), {.key_error = error}, file("b.glb")).error().code,
+                  ErrorCode::usage);
+}
+
 TEST_F(GltfExport, SkinAtRestIsTheMesh) {
     skin(wavy_model(), make_poses(wavy_model(), 5, 24));
     const GltfScene scene = GltfScene::read(file(), kAllThreads).value();

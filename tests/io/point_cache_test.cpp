@@ -253,7 +253,9 @@ TEST_F(PointCache, OnlyFilesAreOpened) {
     ASSERT_EQ(::mkfifo(path("pipe.pc2").c_str(), 0600), 0);
     refuses(path("pipe.pc2"), 2, ErrorCode::unsupported, {"pipe", "file first"}); // and does not wait for a writer
     refuses("-", 2, ErrorCode::unsupported, {".pc2"});
-    refuses(put("a.usda", "#usda 1.0"), 2, ErrorCode::unsupported, {"not read", ".pc2"});
+    refuses(put("a.usda", "#usda 1.0"), 2, ErrorCode::unsuitable, {"no mesh"});
+    refuses(put("a.usdc", "PXR-USDC"), 2, ErrorCode::unsupported, {"binary USD", "usdcat", ".pc2"});
+    refuses(put("a.abc", "Ogawa"), 2, ErrorCode::unsupported, {"Alembic", "Blender", ".pc2"});
     refuses(put("a.ply", "ply"), 2, ErrorCode::unsupported, {".mdd"});
 }
 

@@ -761,6 +761,7 @@ def export(
     influences: int = 3,
     full_precision: bool = False,
     compress: bool = False,
+    key_error: float = 1e-05,
     all_levels: bool = False,
     normals: bool = True,
     morph_normals: bool = False,

@@ -86,8 +86,9 @@ py::dict export_poses(const Model& model, const PoseSequence& poses, const Expor
 py::dict export_model(const PyModel& self, const fs::path& path, const py::object& poses, double frames_per_second,
                       const std::optional<std::string>& as, std::optional<double> key_rate,
                       const std::string& interpolation, unsigned influences, bool full_precision, bool compress,
-                      bool all_levels, bool normals, bool morph_normals, std::optional<unsigned> level,
-                      const fs::path& materials_beside, unsigned threads, const py::object& progress) {
+                      double key_error, bool all_levels, bool normals, bool morph_normals,
+                      std::optional<unsigned> level, const fs::path& materials_beside, unsigned threads,
+                      const py::object& progress) {
     const Model& model = *self.model;
     const LongCall call{threads, progress};
     if (poses.is_none()) {
@@ -112,6 +113,7 @@ py::dict export_model(const PyModel& self, const fs::path& path, const py::objec
     options.skin.influences = influences;
     options.skin.full_precision = full_precision;
     options.skin.compress = options.morph.compress = compress;
+    options.skin.key_error = key_error;
     options.skin.all_levels = all_levels;
     options.skin.normals = options.morph.normals = normals ? ExportNormals::keep : ExportNormals::leave;
     options.morph.morph_normals = morph_normals;
@@ -148,10 +150,10 @@ void add_exporting(py::module_& m) {
         "export", &export_model, py::arg("model"), py::arg("path"), py::arg("poses") = py::none(), py::kw_only(),
         py::arg("frames_per_second") = 60.0, py::arg("motion") = py::none(), py::arg("key_rate") = py::none(),
         py::arg("interpolation") = "linear", py::arg("influences") = 3, py::arg("full_precision") = false,
-        py::arg("compress") = false, py::arg("all_levels") = false, py::arg("normals") = true,
-        py::arg("morph_normals") = false, py::arg("level") = py::none(), py::arg("materials_beside") = "",
-        py::arg("threads") = 0, py::arg("progress") = py::none(),
-        R"(export(model, path, poses=None, *, frames_per_second=60.0, motion=None, key_rate=None, interpolation='linear', influences=3, full_precision=False, compress=False, all_levels=False, normals=True, morph_normals=False, level=None, materials_beside='', threads=0, progress=None)
+        py::arg("compress") = false, py::arg("key_error") = 1e-5, py::arg("all_levels") = false,
+        py::arg("normals") = true, py::arg("morph_normals") = false, py::arg("level") = py::none(),
+        py::arg("materials_beside") = "", py::arg("threads") = 0, py::arg("progress") = py::none(),
+        R"(export(model, path, poses=None, *, frames_per_second=60.0, motion=None, key_rate=None, interpolation='linear', influences=3, full_precision=False, compress=False, key_error=1e-05, all_levels=False, normals=True, morph_normals=False, level=None, materials_beside='', threads=0, progress=None)
 --
 
 Write a model, moving or at rest, for other programs.
@@ -177,6 +179,8 @@ full_precision, all_levels : bool
     Skin: float rotations and weights; coarser levels too.
 compress : bool
     GLB: packed with EXT_meshopt_compression and KHR_mesh_quantization, which viewers have to know.
+key_error : float
+    Skin with compress: how far rounded and fewer keys may move a vertex at a key, fraction of the diagonal.
 normals : bool
     GLB: False leaves them out, and viewers shade flat.
 morph_normals : bool

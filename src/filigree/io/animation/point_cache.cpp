@@ -3,6 +3,7 @@
 #include "filigree/io/animation/point_cache_formats.h"
 #include "filigree/io/animation/pose_match.h"
 #include "filigree/io/animation/usd.h"
+#include "filigree/io/animation/usd_scene.h"
 #include "filigree/io/model/model_file.h"
 #include "filigree/io/system/extension.h"
 #include "filigree/io/system/numbered_name.h"
@@ -51,7 +52,8 @@ MeshAnimation animation_of(FrameSource<Pose> stream, const Mesh& rest) {
                 if (!moved) return moved.error();
                 std::copy(moved->positions.begin(), moved->positions.end(), positions.begin());
                 return Success{};
-            }};
+            },
+            stream.metres_per_unit};
 }
 
 bool is_cache(const std::string& extension) { return extension == ".pc2" || extension == ".mdd"; }
@@ -128,6 +130,18 @@ Result<AnimationFormat> animation_format(const fs::path& path) {
                  path.string() + ": is no name for an animation; " + std::string(kKnownCacheFormats) + "."};
 }
 
+bool is_usd(const fs::path& path) {
+    const std::string extension = lower_extension(path);
+    return extension == ".usda" || extension == ".usd" || extension == ".usdc" || extension == ".usdz";
+}
+
+std::optional<Error> alembic_error(const fs::path& path) {
+    if (lower_extension(path) != ".abc") return std::nullopt;
+    return Error{ErrorCode::unsupported, path.string() +
+                                             ": Alembic is not read; in Blender, import it, and export .pc2 "
+                                             "or .mdd (add-on NewTek MDD), .usda, or an animated .glb."};
+}
+
 namespace {
 
 /// As the file has them.
@@ -151,9 +165,10 @@ Result<FrameSource<Pose>> open_unturned(const fs::path& path, std::size_t points
     if (extension == ".fil") return open_own_poses(path, points, options, context);
     if (extension == ".glb" || extension == ".gltf") {
         if (!numbered_name(path)) return open_gltf_poses(path, points, origin, options, context);
-    } else if (extension == ".usda") {
-        return Error{ErrorCode::unsupported, path.string() + ": USD is written, not read; export a .pc2 there."};
+    } else if (is_usd(path) && !numbered_name(path)) {
+        return open_usd_poses(path, points, origin, options);
     }
+    if (std::optional<Error> error = alembic_error(path)) return *error;
     if (const Result<AnimationFormat> format = animation_format(path); !format) return format.error();
     return open_numbered(path, points, origin, options, context);
 }

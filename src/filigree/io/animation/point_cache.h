@@ -21,6 +21,11 @@ namespace filigree {
 /// The files that exist under the name of an animation: itself, those of a numbered sequence, or all in a folder.
 std::vector<std::filesystem::path> animation_files(const std::filesystem::path& path);
 
+/// Whether a name is that of USD, text or binary.
+bool is_usd(const std::filesystem::path& path);
+/// What to say of an Alembic file (.abc), which no reader is there for.
+std::optional<Error> alembic_error(const std::filesystem::path& path);
+
 struct ChunkReport {
     std::size_t first_frame = 0, frames = 0; ///< of this chunk
     bool was_done = false;                   ///< before: nothing was written

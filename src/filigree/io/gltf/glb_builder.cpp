@@ -1,5 +1,4 @@
 #include "filigree/io/gltf/glb_builder.h"
-#include "filigree/io/gltf/glb_compression.h"
 #include "filigree/io/system/file.h"
 
 #include <algorithm>
@@ -12,7 +11,6 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kHeader = 12, kChunkHeader = 8;
-constexpr int kPositionBits = 17; // of rounded positions, along the longest side
 
 std::size_t padded(std::size_t bytes) { return (bytes + 3) / 4 * 4; }
 
@@ -72,11 +70,18 @@ std::size_t GlbBuilder::add_view(std::string bytes) {
     return add_part({count, std::move(bytes), {}}, GltfTarget::none);
 }
 
+std::size_t GlbBuilder::add_filtered_view(const char* filter, std::size_t stride, std::string bytes,
+                                          std::string filtered) {
+    const std::size_t view = add_view(std::move(bytes));
+    filtered_.push_back({view, filter, stride, std::move(filtered)});
+    return view;
+}
+
 std::size_t GlbBuilder::add_positions(std::span<const Vec3f> positions) {
     std::vector<Vec3f> rounded(positions.begin(), positions.end());
     Box box = bounds(rounded);
-    if (rounds_positions_ && !box.empty() && box.size().maxCoeff() > 0) {
-        const float step = std::ldexp(1.0f, std::ilogb(box.size().maxCoeff()) - kPositionBits); // exact in floats
+    if (position_bits_ > 0 && !box.empty() && box.size().maxCoeff() > 0) {
+        const float step = std::ldexp(1.0f, std::ilogb(box.size().maxCoeff()) - position_bits_); // exact in floats
         for (Vec3f& p : rounded) p = (p / step).array().round() * step;
         box = bounds(rounded);
     }
@@ -193,7 +198,7 @@ Status GlbBuilder::compress() {
     if (gathered_.empty())
         if (const Result<std::string_view> all = gather(); !all) return all.error();
     Result<std::string> packed =
-        compress_views(json, std::string_view(gathered_).substr(gathered_.size() - data_bytes_));
+        compress_views(json, std::string_view(gathered_).substr(gathered_.size() - data_bytes_), filtered_);
     if (!packed) return packed.error();
     gathered_ = std::move(*packed);
     data_bytes_ = gathered_.size();

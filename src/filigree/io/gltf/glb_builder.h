@@ -2,6 +2,7 @@
 #pragma once
 
 #include "filigree/context.h"
+#include "filigree/io/gltf/glb_compression.h"
 #include "filigree/io/gltf/gltf_component.h"
 #include "filigree/result.h"
 #include "filigree/types.h"
@@ -51,6 +52,11 @@ public:
     std::size_t add(const GltfAccessor& accessor, std::size_t byte_count, Producer producer);
     /// A picture's bytes as a buffer view. Returns the view's number.
     std::size_t add_view(std::string bytes);
+    /// Bytes for accessors that come later, and what compress packs in their place: the same elements of `stride` bytes
+    /// as a filter of EXT_meshopt_compression has them. Returns the view's number.
+    std::size_t add_filtered_view(const char* filter, std::size_t stride, std::string bytes, std::string filtered);
+    /// An accessor over a part of a view. Returns its number.
+    std::size_t add_accessor(const GltfAccessor& accessor, std::size_t view, std::size_t offset);
 
     // The usual ones.
     std::size_t add_positions(std::span<const Vec3f> positions); ///< with bounds
@@ -58,8 +64,8 @@ public:
     std::size_t add_indices(std::span<const Index> indices); ///< uint16 where every index is below 65535, else uint32
     std::size_t add_scalars(std::span<const float> values, GltfTarget target, bool with_bounds = false);
 
-    /// Rounds the positions that come to a 2^17th of their box's longest side, so that compress packs them well.
-    void round_positions() { rounds_positions_ = true; }
+    /// Rounds the positions that come to a 2^bits-th of their box's longest side, so that compress packs them well.
+    void round_positions(int bits = 17) { position_bits_ = bits; }
     /// Packs everything (glb_compression.h); only `asset` may change afterwards. Errors: as of gather.
     Status compress();
 
@@ -81,11 +87,11 @@ private:
     };
     std::vector<Part> parts_;
     std::size_t data_bytes_ = 0;
-    bool rounds_positions_ = false;
+    int position_bits_ = 0; ///< 0: as they come
+    std::vector<FilteredView> filtered_;
     std::string gathered_; ///< the file, and in its last bytes the parts; empty: they are in parts_
 
     std::size_t add_part(Part part, GltfTarget target);
-    std::size_t add_accessor(const GltfAccessor& accessor, std::size_t view, std::size_t offset);
     using Write = std::function<Status(std::string_view)>;
     std::string json_chunk() const;
     /// What stands before the parts. Errors: unsupported.

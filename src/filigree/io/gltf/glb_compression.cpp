@@ -84,7 +84,7 @@ void add_extension(Json& document, const char* name) {
 
 } // namespace
 
-Result<std::string> compress_views(Json& document, std::string_view data) {
+Result<std::string> compress_views(Json& document, std::string_view data, std::span<const FilteredView> filtered) {
     Json& views = document["bufferViews"];
     std::vector<std::vector<Json*>> accessors(views.size()); // of each view
     for (Json& accessor : document["accessors"])
@@ -125,10 +125,14 @@ Result<std::string> compress_views(Json& document, std::string_view data) {
             view["byteStride"] = 4;
             add_extension(document, "KHR_mesh_quantization");
         }
+        const auto by_filter = std::ranges::find(filtered, k, &FilteredView::view);
+        const bool is_filtered = by_filter != filtered.end();
         const bool are_indices = view.value("target", 0) == kIndices;
         const std::size_t element = view.value("byteStride", accessors[k].size() == 1 ? element_bytes(first) : 4);
         PackedView made;
-        if (are_indices && accessors[k].size() == 1 && first["componentType"] >= kUint16) {
+        if (is_filtered) {
+            made = packed_vertices(by_filter->bytes, by_filter->stride);
+        } else if (are_indices && accessors[k].size() == 1 && first["componentType"] >= kUint16) {
             made = packed_indices(raw, first["componentType"],
                                   holds_triangles[k] && first["count"].get<std::size_t>() % 3 == 0);
         } else if (element % 4 == 0 && element <= kLargestStride && raw.size() % element == 0) {
@@ -146,6 +150,7 @@ Result<std::string> compress_views(Json& document, std::string_view data) {
         extension["byteStride"] = made.stride;
         extension["mode"] = made.mode;
         extension["count"] = made.count;
+        if (is_filtered) extension["filter"] = by_filter->filter;
         view["extensions"]["EXT_meshopt_compression"] = std::move(extension);
     }
     document["buffers"] = Json::array({{{"byteLength", packed.size()}}});

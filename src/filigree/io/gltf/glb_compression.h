@@ -3,6 +3,7 @@
 
 #include "filigree/result.h"
 
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -10,9 +11,18 @@
 
 namespace filigree {
 
+/// What is packed in place of a view's bytes: the same elements, as a filter has them.
+struct FilteredView {
+    std::size_t view;
+    const char* filter; ///< EXPONENTIAL or QUATERNION
+    std::size_t stride;
+    std::string bytes;
+};
+
 /// Packs what `document` describes in `data`, its only buffer: vertices, triangles and keys, each view on its own;
-/// pictures stay. Changes the document's views, buffers, accessors of normals and extensions. Returns the new data.
-/// Errors: out_of_memory. Cost O(size).
-Result<std::string> compress_views(nlohmann::ordered_json& document, std::string_view data);
+/// pictures stay. filtered: views whose elements a viewer filters after unpacking. Changes the document's views,
+/// buffers, accessors of normals and extensions. Returns the new data. Errors: out_of_memory. Cost O(size).
+Result<std::string> compress_views(nlohmann::ordered_json& document, std::string_view data,
+                                   std::span<const FilteredView> filtered);
 
 } // namespace filigree

@@ -3,6 +3,7 @@
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/io/gltf/glb_coded_keys.h"
 
 #include <algorithm>
 #include <cmath>
@@ -28,23 +29,17 @@ double percentile95(std::vector<float> values) {
     return values[place];
 }
 
-/// One animated property of one node: `width` numbers a sample.
-struct Track {
-    const char* path; ///< as glTF names it
-    bool inner;       ///< of the joint's inner node
-    std::size_t width;
-    std::vector<double> values;
-    std::array<double, 4> rest; ///< what the node has when nothing plays
-};
+constexpr std::size_t kTracksOfJoint = 4;
 
-std::array<Track, 4> make_tracks(const std::vector<NestedRotations>& parts, std::span<const Vec3f> translations,
-                                 const Vec3d& rest, double gradient_scale) {
+std::array<KeyTrack, kTracksOfJoint> make_tracks(const std::vector<NestedRotations>& parts,
+                                                 std::span<const Vec3f> translations, const Vec3d& rest,
+                                                 double gradient_scale) {
     const Vec3d scale = resting_rotations(gradient_scale).outer_scale;
-    std::array<Track, 4> tracks = {{{"translation", false, 3, {}, {rest[0], rest[1], rest[2], 0}},
-                                    {"rotation", false, 4, {}, {0, 0, 0, 1}},
-                                    {"scale", false, 3, {}, {scale[0], scale[1], scale[2], 0}},
-                                    {"rotation", true, 4, {}, {0, 0, 0, 1}}}};
-    const auto add = [](Track& track, const auto& numbers) {
+    std::array<KeyTrack, kTracksOfJoint> tracks = {{{"translation", false, 3, {}, {rest[0], rest[1], rest[2], 0}},
+                                                    {"rotation", false, 4, {}, {0, 0, 0, 1}},
+                                                    {"scale", false, 3, {}, {scale[0], scale[1], scale[2], 0}},
+                                                    {"rotation", true, 4, {}, {0, 0, 0, 1}}}};
+    const auto add = [](KeyTrack& track, const auto& numbers) {
         track.values.insert(track.values.end(), numbers.data(), numbers.data() + track.width);
     };
     for (std::size_t s = 0; s < parts.size(); ++s) {
@@ -56,8 +51,33 @@ std::array<Track, 4> make_tracks(const std::vector<NestedRotations>& parts, std:
     return tracks;
 }
 
+/// How far from each joint the skin has vertices that it moves.
+std::vector<double> joint_reach(const Skin& skin) {
+    std::vector<double> reach(skin.joints.size(), 0);
+    for (std::size_t i = 0; i < skin.vertex_joints.size(); ++i) {
+        if (!(skin.vertex_weights[i] > 0)) continue;
+        const Index joint = skin.vertex_joints[i];
+        const Vec3d from = skin.positions[i / skin.slots].cast<double>() - skin.rest[joint];
+        reach[joint] = std::max(reach[joint], from.norm());
+    }
+    return reach;
+}
+
+/// Tolerances with which each of a joint's tracks moves what hangs on it by `share` at most. A joint's matrix is
+/// outer_rotation * diag(outer_scale) * inner_rotation * diag(kInnerScale).
+void set_tolerances(std::array<KeyTrack, kTracksOfJoint>& tracks, double share, double reach) {
+    constexpr double kMostTurn = 0.1, kMostScale = 0.05; // beyond which an angle is no longer small
+    const double inner = kInnerScale.maxCoeff();
+    double largest = 0; // scale
+    for (const double value : tracks[2].values) largest = std::max(largest, std::abs(value));
+    const double turn = reach * largest * inner;
+    tracks[0].tolerance = share;
+    tracks[1].tolerance = tracks[3].tolerance = turn > 0 ? std::min(share / turn, kMostTurn) : kMostTurn;
+    tracks[2].tolerance = reach > 0 ? std::min(share / (reach * inner), kMostScale) : kMostScale;
+}
+
 /// Numbers as a sampler's output holds them: at keys alone, or each between its tangents.
-std::vector<double> key_values(const Track& track, std::span<const SkinKey> keys, bool cubic) {
+std::vector<double> key_values(const KeyTrack& track, std::span<const SkinKey> keys, bool cubic) {
     std::vector<double> values;
     const auto number = [&](std::size_t sample, std::size_t k) { return track.values[sample * track.width + k]; };
     for (const SkinKey& key : keys)
@@ -79,7 +99,7 @@ public:
           input_(builder.add_scalars(times, GltfTarget::none, true)) {}
 
     /// A track that stays at rest is left out; one that stays elsewhere has a single key.
-    void add(const Track& track, std::size_t node) {
+    void add(const KeyTrack& track, std::size_t node) {
         std::vector<double> values = key_values(track, keys_, cubic_);
         const std::size_t step = track.width * (cubic_ ? 3 : 1);
         const bool constant = is_constant(track, values, step);
@@ -130,14 +150,14 @@ private:
     Json channels_ = Json::array(), samplers_ = Json::array();
 
     static bool same(double a, double b) { return static_cast<float>(a) == static_cast<float>(b); }
-    bool is_constant(const Track& track, const std::vector<double>& values, std::size_t step) const {
+    bool is_constant(const KeyTrack& track, const std::vector<double>& values, std::size_t step) const {
         for (std::size_t k = 0; k < values.size(); ++k) {
             const bool tangent = cubic_ && (k % step < track.width || k % step >= 2 * track.width);
             if (!same(values[k], tangent ? 0 : values[k % step])) return false;
         }
         return true;
     }
-    bool is_at_rest(const Track& track) const {
+    bool is_at_rest(const KeyTrack& track) const {
         for (std::size_t k = 0; k < track.width; ++k)
             if (!same(track.values[k], track.rest[k])) return false;
         return true;
@@ -155,6 +175,7 @@ void SkinAnimation::plan(const FrameSource<Pose>& stream, const SkinOptions& opt
     if (duration - keys.back() > 1e-6 / rate) keys.push_back(duration); // the last frame is always a key
     cubic_ = options.interpolation == KeyInterpolation::cubic && keys.size() > 1;
     small_rotations_ = !options.full_precision && !cubic_; // tangents go beyond what 16 bits hold
+    if (options.compress && small_rotations_) key_error_ = options.key_error;
 
     const auto sample = [&](double time) {
         times_.push_back(std::clamp(time, 0.0, duration));
@@ -231,6 +252,40 @@ std::vector<double> SkinAnimation::key_times() const {
     return times;
 }
 
+/// Of the driver where it is first: a pose may be in other units than the rest shape.
+double SkinAnimation::diagonal() const {
+    Box box;
+    for (const std::vector<Vec3f>& places : translations_) box.extend(places.front().cast<double>());
+    return box.diagonal();
+}
+
+Vec3d SkinAnimation::place(const Skin& skin, std::size_t vertex, std::size_t sample) const {
+    Vec3d sum = Vec3d::Zero();
+    for (std::size_t i = vertex * skin.slots; i < (vertex + 1) * skin.slots; ++i) {
+        if (!(skin.vertex_weights[i] > 0)) continue;
+        const Index joint = skin.vertex_joints[i];
+        const Vec3d from = skin.positions[vertex].cast<double>() - skin.rest[joint];
+        sum += double(skin.vertex_weights[i]) *
+               (matrices_[joint][sample].cast<double>() * from + translations_[joint][sample].cast<double>());
+    }
+    return sum;
+}
+
+double SkinAnimation::distance(const Skin& a, const Skin& b, const RunContext& context) const {
+    constexpr std::size_t kKeys = 5, kGrain = 4096;
+    std::vector<double> farthest((a.positions.size() + kGrain - 1) / kGrain, 0);
+    for (std::size_t k = 1; k <= kKeys; ++k) {
+        const std::size_t sample = keys_[(keys_.size() - 1) * k / kKeys].sample;
+        parallel_for(context, a.positions.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+            double& largest = farthest[begin / kGrain];
+            for (std::size_t v = begin; v < end; ++v)
+                largest = std::max(largest, (place(a, v, sample) - place(b, v, sample)).norm());
+        });
+    }
+    const double size = diagonal();
+    return size > 0 && !farthest.empty() ? *std::ranges::max_element(farthest) / size : 0;
+}
+
 GlbBuilder::Json SkinAnimation::add_to(GlbBuilder& builder, const std::string& name, const Skin& skin,
                                        std::size_t first_node, const RunContext& context) const {
     std::vector<std::vector<NestedRotations>> parts(skin.joints.size());
@@ -242,10 +297,33 @@ GlbBuilder::Json SkinAnimation::add_to(GlbBuilder& builder, const std::string& n
         }
     });
     const std::vector<double> times = key_times();
+    if (key_error_) return add_coded(builder, name, skin, first_node, parts, context);
     ChannelWriter channels(builder, keys_, std::vector<float>(times.begin(), times.end()), cubic_, small_rotations_);
     for (std::size_t j = 0; j < parts.size(); ++j)
-        for (const Track& track : make_tracks(parts[j], translations_[j], skin.rest[j], skin.gradient_scale()))
+        for (const KeyTrack& track : make_tracks(parts[j], translations_[j], skin.rest[j], skin.gradient_scale()))
             channels.add(track, first_node + 2 * j + (track.inner ? 1 : 0));
+    return channels.finish(name);
+}
+
+GlbBuilder::Json SkinAnimation::add_coded(GlbBuilder& builder, const std::string& name, const Skin& skin,
+                                          std::size_t first_node, std::span<const std::vector<NestedRotations>> parts,
+                                          const RunContext& context) const {
+    const std::vector<double> times = key_times();
+    const std::vector<double> reach = joint_reach(skin);
+    const double share = *key_error_ * diagonal() / kTracksOfJoint;
+    std::vector<std::array<KeyTrack, kTracksOfJoint>> tracks(parts.size());
+    std::vector<std::array<CodedTrack, kTracksOfJoint>> coded(parts.size());
+    parallel_for(context, parts.size(), 16, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t j = begin; j < end; ++j) {
+            tracks[j] = make_tracks(parts[j], translations_[j], skin.rest[j], skin.gradient_scale());
+            set_tolerances(tracks[j], share, reach[j]);
+            for (std::size_t k = 0; k < kTracksOfJoint; ++k) coded[j][k] = code_track(tracks[j][k], times);
+        }
+    });
+    CodedChannels channels(builder, times);
+    for (std::size_t j = 0; j < parts.size(); ++j)
+        for (std::size_t k = 0; k < kTracksOfJoint; ++k)
+            channels.add(tracks[j][k], std::move(coded[j][k]), first_node + 2 * j + (tracks[j][k].inner ? 1 : 0));
     return channels.finish(name);
 }
 

@@ -7,6 +7,8 @@
 #include "filigree/restore.h"
 
 #include <array>
+#include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,6 +34,10 @@ public:
     /// 95th percentile over driver vertices and keys of ExportReport::normal_error_degrees.
     double normal_error_degrees() const { return normal_error_degrees_; }
 
+    /// The largest distance of two skins' vertices in some keys, fraction of the driver's diagonal. The skins have the
+    /// joints of this animation, and other weights and positions.
+    double distance(const Skin& a, const Skin& b, const RunContext& context) const;
+
     /// Adds the keys, as an animation of that name, to a file where joint j has the outer node first_node + 2 j and the
     /// inner node after it. Returns the animation, null when nothing moves. A property that stays at rest has no
     /// channel; one that stays elsewhere has one key.
@@ -40,12 +46,17 @@ public:
 
 private:
     bool cubic_ = false, small_rotations_ = false;
-    std::vector<double> times_; ///< of samples, seconds
+    std::optional<double> key_error_; ///< keys are coded within this error, a fraction of the diagonal
+    std::vector<double> times_;       ///< of samples, seconds
     std::vector<SkinKey> keys_;
     std::vector<std::vector<Mat3f>> matrices_;     ///< of each joint, sample after sample
     std::vector<std::vector<Vec3f>> translations_; ///< the same
     double normal_error_degrees_ = 0;
 
+    GlbBuilder::Json add_coded(GlbBuilder& builder, const std::string& name, const Skin& skin, std::size_t first_node,
+                               std::span<const std::vector<NestedRotations>> parts, const RunContext& context) const;
+    double diagonal() const;
+    Vec3d place(const Skin& skin, std::size_t vertex, std::size_t sample) const;
     void plan(const FrameSource<Pose>& stream, const SkinOptions& options);
 };
 

@@ -1,6 +1,7 @@
 // Skins: the layout of nodes and why it is like this are in docs/exchange.md.
 #include "filigree/file.h"
 
+#include "filigree/core/math.h"
 #include "filigree/io/gltf/glb_levels.h"
 #include "filigree/io/gltf/glb_parts.h"
 #include "filigree/io/gltf/glb_skeleton.h"
@@ -16,6 +17,7 @@
 #include <cmath>
 #include <map>
 #include <new>
+#include <tuple>
 
 namespace filigree {
 
@@ -50,30 +52,74 @@ std::string narrow_joints(std::span<const Index> joints, std::size_t first, cons
     return bytes ? bytes_of(std::span<const std::uint8_t>(small)) : bytes_of(std::span<const std::uint16_t>(large));
 }
 
+/// How weights leave.
+enum class WeightSteps { bytes, words, exact };
+
+/// Weights as multiples of 1 / 255; positions are such that the rest shape stays.
+void round_to_bytes(Skin& skin) {
+    constexpr int kSteps = 255;
+    for (std::size_t v = 0; v < skin.positions.size(); ++v) {
+        const std::span<float> weights = std::span(skin.vertex_weights).subspan(v * skin.slots, skin.slots);
+        const std::span<const Index> joints = std::span(skin.vertex_joints).subspan(v * skin.slots, skin.slots);
+        Vec3d shift = Vec3d::Zero();
+        int left = kSteps;
+        for (std::size_t k = 1; k < skin.slots; ++k) left -= int(std::lround(kSteps * weights[k]));
+        for (std::size_t k = 0; k < skin.slots; ++k) { // the largest takes what is left over
+            const float rounded = float(k == 0 ? left : std::lround(kSteps * weights[k])) / kSteps;
+            shift += double(weights[k] - rounded) * skin.rest[joints[k]];
+            weights[k] = rounded;
+        }
+        skin.positions[v] = (skin.positions[v].cast<double>() + shift).cast<float>();
+    }
+}
+
+/// Joints in the order of their numbers, which neighbours share, and not by weight.
+void sort_by_joint(Skin& skin) {
+    std::vector<std::pair<Index, float>> influences;
+    for (std::size_t v = 0; v < skin.positions.size(); ++v) {
+        influences.clear();
+        for (std::size_t i = v * skin.slots; i < (v + 1) * skin.slots; ++i)
+            if (skin.vertex_weights[i] > 0) influences.emplace_back(skin.vertex_joints[i], skin.vertex_weights[i]);
+        std::ranges::sort(influences);
+        for (std::size_t k = 0; k < influences.size(); ++k)
+            std::tie(skin.vertex_joints[v * skin.slots + k], skin.vertex_weights[v * skin.slots + k]) = influences[k];
+        for (std::size_t k = influences.size(); k < skin.slots; ++k)
+            skin.vertex_joints[v * skin.slots + k] = 0, skin.vertex_weights[v * skin.slots + k] = 0;
+    }
+}
+
 std::string packed_weights(std::span<const float> weights, std::size_t first, const GlbParts& parts, std::size_t slots,
-                           bool exact) {
+                           WeightSteps steps) {
     std::vector<float> floats;
-    std::vector<std::uint16_t> steps;
+    std::vector<std::uint16_t> words;
+    std::vector<std::uint8_t> bytes;
     for (std::size_t v = 0; v < parts.vertex_count(); ++v)
         for (std::size_t k = 0; k < 4; ++k) {
             const float weight = weights[parts.source(v) * slots + first + k];
-            if (exact)
+            if (steps == WeightSteps::exact)
                 floats.push_back(weight);
+            else if (steps == WeightSteps::words)
+                words.push_back(static_cast<std::uint16_t>(std::lround(65535 * weight)));
             else
-                steps.push_back(static_cast<std::uint16_t>(std::lround(65535 * weight)));
+                bytes.push_back(static_cast<std::uint8_t>(std::lround(255 * weight)));
         }
-    return exact ? bytes_of(std::span<const float>(floats)) : bytes_of(std::span<const std::uint16_t>(steps));
+    if (steps == WeightSteps::bytes) return bytes_of(std::span<const std::uint8_t>(bytes));
+    return steps == WeightSteps::exact ? bytes_of(std::span<const float>(floats))
+                                       : bytes_of(std::span<const std::uint16_t>(words));
 }
 
 /// JOINTS_n and WEIGHTS_n, four influences each.
-void add_influences(GlbBuilder& builder, const GlbParts& parts, const Skin& skin, bool exact, Json& attributes) {
+void add_influences(GlbBuilder& builder, const GlbParts& parts, const Skin& skin, WeightSteps steps, Json& attributes) {
+    const bool exact = steps == WeightSteps::exact;
     const bool bytes = skin.joints.size() <= 256;
     for (std::size_t set = 0; 4 * set < skin.slots; ++set) {
         GltfAccessor joints{.component = bytes ? GltfComponent::uint8 : GltfComponent::uint16,
                             .type = "VEC4",
                             .target = GltfTarget::vertices,
                             .count = parts.vertex_count()};
-        GltfAccessor weights{.component = exact ? GltfComponent::float32 : GltfComponent::uint16,
+        GltfAccessor weights{.component = exact                         ? GltfComponent::float32
+                                          : steps == WeightSteps::words ? GltfComponent::uint16
+                                                                        : GltfComponent::uint8,
                              .type = "VEC4",
                              .normalized = !exact,
                              .target = GltfTarget::vertices,
@@ -82,7 +128,7 @@ void add_influences(GlbBuilder& builder, const GlbParts& parts, const Skin& skin
         attributes["JOINTS_" + number] =
             builder.add(joints, narrow_joints(skin.vertex_joints, 4 * set, parts, skin.slots, bytes));
         attributes["WEIGHTS_" + number] =
-            builder.add(weights, packed_weights(skin.vertex_weights, 4 * set, parts, skin.slots, exact));
+            builder.add(weights, packed_weights(skin.vertex_weights, 4 * set, parts, skin.slots, steps));
     }
 }
 
@@ -99,28 +145,37 @@ public:
         const unsigned level = restored_level(model_, options_.restore).value();
         Result<Restorer> restorer = Restorer::create(model_, options_.restore, context_);
         if (!restorer) return restorer.error();
-        if (options_.compress) builder_.round_positions();
-        Skin skin;
-        for (unsigned k = level + 1; k-- > 0;) {
-            if (k < level && !options_.all_levels) break;
-            Result<Skin> made = make_skin(model_, k, options_.influences, options_.full_precision);
-            if (!made) return made.error();
-            // Joints of edges are numbered as they are met, and coarser levels meet no others.
-            if (k == level) skin = *made;
-            if (k < level && made->influences == 6) renumber(*made, skin);
-            if (Status added = add_level(k, *made); !added) return added.error();
-        }
-        if (skin.joints.size() > 65536)
+        if (options_.compress) builder_.round_positions(bits_of_positions());
+        const auto skin_of = [&](unsigned k) {
+            return make_skin(model_, k, options_.influences, options_.full_precision);
+        };
+        Result<Skin> finest = skin_of(level);
+        if (!finest) return finest.error();
+        if (finest->joints.size() > 65536)
             return Error{ErrorCode::unsuitable,
-                         "The driver would need " + std::to_string(skin.joints.size()) +
+                         "The driver would need " + std::to_string(finest->joints.size()) +
                              " joints, and glTF counts to 65536; use a model with a smaller driver."};
         std::vector<Played> played;
         for (const NamedPoses& clip : clips_) {
             PoseSampler poses(clip.poses, [&](const Pose& pose) { return check_pose(model_, pose); });
             Result<SkinAnimation> animation =
-                SkinAnimation::sample(skin, clip.poses, poses, *restorer, options_, context_);
+                SkinAnimation::sample(*finest, clip.poses, poses, *restorer, options_, context_);
             if (!animation) return animation.error();
             played.push_back({clip, *std::move(animation), std::move(poses)});
+        }
+        choose_weight_steps(*finest, played);
+        const Skin skin = *finest;
+        for (unsigned k = level + 1; k-- > 0;) {
+            if (k < level && !options_.all_levels) break;
+            Result<Skin> made = k == level ? std::move(finest) : skin_of(k);
+            if (!made) return made.error();
+            // Joints of edges are numbered as they are met, and coarser levels meet no others.
+            if (k < level && made->influences == 6) renumber(*made, skin);
+            if (options_.compress && made->influences == 3) {
+                if (weight_steps_ == WeightSteps::bytes) round_to_bytes(*made);
+                sort_by_joint(*made);
+            }
+            if (Status added = add_level(k, *made); !added) return added.error();
         }
         if (!options_.skeleton_of.empty()) {
             Result<GlbSkeleton> read = GlbSkeleton::read(options_.skeleton_of, context_);
@@ -165,6 +220,7 @@ private:
     std::optional<GlbSkeleton> skeleton_;
     std::vector<std::size_t> level_nodes_;
     std::vector<std::string> lost_; ///< what glTF cannot hold
+    WeightSteps weight_steps_ = WeightSteps::words;
     ExportReport report_;
 
     Status check() const {
@@ -182,8 +238,42 @@ private:
                          "A vertex of a skin has 3 or 6 influences, not " + std::to_string(options_.influences) + "."};
         if (options_.key_rate && !(*options_.key_rate > 0 && *options_.key_rate <= 1e6))
             return Error{ErrorCode::usage, "The key rate has to be above 0 and at most 1000000, in keys a second."};
+        if (!(options_.key_error > 0 && options_.key_error <= 0.1))
+            return Error{ErrorCode::usage,
+                         "The error of keys has to be above 0 and at most 0.1, a fraction of the diagonal."};
         if (Result<unsigned> level = restored_level(model_, options_.restore); !level) return level.error();
         return Success{};
+    }
+
+    /// Bytes where a small file is wanted and they move no vertex by much of the error that is allowed.
+    void choose_weight_steps(const Skin& skin, std::span<const Played> played) {
+        constexpr double kShareOfWeights = 0.6;
+        weight_steps_ = options_.full_precision ? WeightSteps::exact : WeightSteps::words;
+        if (!options_.compress || options_.full_precision || skin.influences != 3) return;
+        Skin rounded = skin;
+        round_to_bytes(rounded);
+        for (const Played& clip : played)
+            if (!(clip.animation.distance(skin, rounded, context_) <= kShareOfWeights * options_.key_error)) return;
+        weight_steps_ = WeightSteps::bytes;
+    }
+    /// Along the longest side: 17, or what moves a vertex by an eighth of the keys' error.
+    int bits_of_positions() const {
+        constexpr int kFewest = 12, kMost = 17;
+        const int enough = 3 - int(std::floor(math::log2(options_.key_error)));
+        return options_.full_precision ? kMost : std::clamp(enough, kFewest, kMost);
+    }
+
+    /// Numbers of a node as floats; short ones in a small file.
+    Json numbers_of(const Vec3d& v) const {
+        if (options_.compress) return {v[0], v[1], v[2]};
+        return json_numbers(v);
+    }
+    /// Where a joint is at rest; in a small file to a 2^-20th of the diagonal, in decimals.
+    Json place_of_joint(const Vec3d& rest, double diagonal) const {
+        if (!options_.compress || !(diagonal > 0)) return json_numbers(rest);
+        const double steps = math::power_of_ten(int(std::ceil(math::log10(std::ldexp(1 / diagonal, 20)))));
+        return {std::round(rest[0] * steps) / steps, std::round(rest[1] * steps) / steps,
+                std::round(rest[2] * steps) / steps};
     }
 
     static void renumber(Skin& skin, const Skin& finest) {
@@ -204,7 +294,7 @@ private:
         const GlbMaterials& materials = levels_.add_materials(builder_, parts);
         Json attributes = add_glb_attributes(builder_, parts, mesh);
         attributes["POSITION"] = builder_.add_positions(parts.spread(std::span<const Vec3f>(skin.positions)));
-        add_influences(builder_, parts, skin, options_.full_precision, attributes);
+        add_influences(builder_, parts, skin, weight_steps_, attributes);
         const Json repeats = add_glb_repeats(builder_, parts);
         for (const GlbObject& object : parts.objects) {
             Json entry = add_glb_mesh(builder_, parts, object, materials, attributes);
@@ -233,16 +323,17 @@ private:
         nodes_.push_back(std::move(driver));
 
         const Vec3d rest_scale = resting_rotations(skin.gradient_scale()).outer_scale;
+        const double diagonal = bounds(skin.positions).diagonal();
         const std::size_t first_joint = nodes_.size();
         Json joints = Json::array();
         std::vector<Eigen::Matrix4f> inverse_binds;
         for (std::size_t j = 0; j < skin.joints.size(); ++j) {
             const std::size_t outer = nodes_.size();
             nodes_[root]["children"].push_back(outer);
-            nodes_.push_back({{"translation", json_numbers(skin.rest[j])},
-                              {"scale", json_numbers(rest_scale)},
+            nodes_.push_back({{"translation", place_of_joint(skin.rest[j], diagonal)},
+                              {"scale", numbers_of(rest_scale)},
                               {"children", {outer + 1}}});
-            nodes_.push_back({{"scale", json_numbers(kInnerScale)}});
+            nodes_.push_back({{"scale", numbers_of(kInnerScale)}});
             joints.push_back(outer + 1);
             inverse_binds.push_back(Eigen::Matrix4f::Identity());
             inverse_binds.back().topRightCorner<3, 1>() = -skin.rest[j].cast<float>();
