@@ -29,18 +29,22 @@ if(FILIGREE_NODE AND bundler)
                  mesh/triangle_point)
       list(APPEND decoder_sources ${PROJECT_SOURCE_DIR}/src/filigree/${name}.cpp)
     endforeach()
+    foreach(name clip sort symbols) # the runtime's C compiles as C++, too
+      list(APPEND decoder_sources ${PROJECT_SOURCE_DIR}/runtime/rt_${name}.c)
+    endforeach()
     # As one source: the headers are read once.
     list(TRANSFORM decoder_sources REPLACE "(.+)" "#include \"\\1\"\n" OUTPUT_VARIABLE decoder_lines)
     string(JOIN "" decoder_lines ${decoder_lines})
     set(whole_decoder ${CMAKE_CURRENT_BINARY_DIR}/web/decoder.cpp)
     file(CONFIGURE OUTPUT ${whole_decoder} CONTENT "${decoder_lines}" @ONLY)
-    file(GLOB decoder_headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/filigree/pack/*.h)
+    file(GLOB decoder_headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/filigree/pack/*.h
+         ${PROJECT_SOURCE_DIR}/runtime/*.h)
     find_path(FILIGREE_EIGEN_FOLDER Eigen/Core PATH_SUFFIXES eigen3)
     add_custom_command(
       OUTPUT ${decoder}
       COMMAND ${FILIGREE_WASM_CLANG} --target=wasm32-wasi --sysroot=/usr -mexec-model=reactor -std=c++20 -O3
               -ffp-contract=off -fno-exceptions -fno-rtti -ffunction-sections -fdata-sections -DNDEBUG
-              -I ${PROJECT_SOURCE_DIR}/include -I ${PROJECT_SOURCE_DIR}/src
+              -I ${PROJECT_SOURCE_DIR}/include -I ${PROJECT_SOURCE_DIR}/src -I ${PROJECT_SOURCE_DIR}
               -nostdinc++ -isystem /usr/lib/llvm-16/include/wasm32-wasi/c++/v1 -isystem /usr/include/wasm32-wasi
               -isystem ${FILIGREE_EIGEN_FOLDER} ${whole_decoder} -o ${decoder} -L${wasm_library} -L/usr/lib/wasm32-wasi
               -Wl,--gc-sections -Wl,--strip-all

@@ -28,7 +28,6 @@ static const double FLG_RIDGE = 3e-8; /* on the kernel: keeps vertices almost at
 static const double FLG_FLAT = 6e-4,
                     FLG_SOLID = 6e-3;     /* thickness in widths: below the first completed, above the sum */
 static const double FLG_NO_SPREAD = 1e-4; /* thickness in widths below which a direction has no linear term */
-static const uint32_t FLG_NONE = 0xffffffffu;
 
 /* The terms of a vertex's sum. */
 typedef struct flg_terms {
@@ -227,44 +226,6 @@ static FLG_COLD uint32_t root_of(uint32_t* above, uint32_t v) {
 
 /* ---- Trees ---- */
 
-static int comes_first(const flg_key* a, const flg_key* b) {
-    return (a->key < b->key) | ((a->key == b->key) & (a->value < b->value));
-}
-
-void flg_sort(flg_key* keys, flg_key* other, size_t count) {
-    enum { PIECE = 8 };
-    flg_key *from = keys, *to = other;
-    for (size_t begin = 0; begin < count; begin += PIECE) { /* short pieces by insertion, then longer ones by merging */
-        const size_t end = count - begin < PIECE ? count : begin + PIECE;
-        for (size_t k = begin + 1; k < end; ++k) {
-            const flg_key moved = keys[k];
-            size_t at = k;
-            for (; at > begin && comes_first(&moved, keys + at - 1); --at) keys[at] = keys[at - 1];
-            keys[at] = moved;
-        }
-    }
-    for (size_t length = PIECE; length < count; length *= 2) {
-        flg_key* swapped = from;
-        for (size_t begin = 0; begin < count; begin += 2 * length) {
-            const size_t middle = count - begin < length ? count : begin + length,
-                         end = count - begin < 2 * length ? count : begin + 2 * length;
-            const flg_key *a = from + begin, *a_end = from + middle, *b = a_end, *b_end = from + end;
-            flg_key* next = to + begin;
-            while (a < a_end && b < b_end) { /* without a branch that nobody can foresee */
-                const int right = comes_first(b, a);
-                *next++ = *(right ? b : a);
-                a += !right;
-                b += right;
-            }
-            memcpy(next, a, (size_t)(a_end - a) * sizeof *a);
-            memcpy(next + (a_end - a), b, (size_t)(b_end - b) * sizeof *b);
-        }
-        from = to;
-        to = swapped;
-    }
-    if (from != keys) memcpy(keys, from, count * sizeof *keys);
-}
-
 /* The lower 21 bits of x, two zeros between each. */
 static uint64_t spread_bits(uint64_t x) {
     x &= 0x1fffff;
@@ -368,7 +329,7 @@ static void keep_nearest(flg_candidates* candidates) {
             const flg_key key = keys[k];
             keys[k] = keys[place];
             keys[place] = key;
-            place += (size_t)comes_first(&key, &pivot);
+            place += (size_t)flg_comes_first(&key, &pivot);
         }
         keys[end - 1] = keys[place];
         keys[place] = pivot;
@@ -388,8 +349,8 @@ static void sink(flg_key* heap, size_t count, size_t at) {
     for (;;) {
         size_t child = 2 * at + 1;
         if (child >= count) break;
-        if (child + 1 < count) child += (size_t)comes_first(heap + child + 1, heap + child);
-        if (!comes_first(heap + child, &moved)) break;
+        if (child + 1 < count) child += (size_t)flg_comes_first(heap + child + 1, heap + child);
+        if (!flg_comes_first(heap + child, &moved)) break;
         heap[at] = heap[child];
         at = child;
     }

@@ -3,6 +3,7 @@
 #define FILIGREE_RT_FIT_H
 
 #include "rt_kernel.h"
+#include "rt_sort.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -20,22 +21,7 @@ FLG_SHARED flg_allocator flg_default_allocator(void);
 FLG_SHARED void* flg_allocate(const flg_allocator* from, uint64_t count, size_t item);
 FLG_SHARED void flg_release(const flg_allocator* to, void* memory);
 
-/* What is sorted: by key, of equal keys the lower value first. */
-typedef struct flg_key {
-    uint64_t key;
-    uint32_t value;
-} flg_key;
-/* other: scratch memory for as many. */
-FLG_SHARED void flg_sort(flg_key* keys, flg_key* other, size_t count);
-
 typedef struct flg_fit flg_fit;
-
-/* The faces of a driver. */
-typedef struct flg_faces {
-    const uint32_t* corners;
-    const uint32_t* offsets; /* count + 1, ascending; NULL: triangles */
-    size_t count;
-} flg_faces;
 
 /* Begins a fit: finds what is connected and sorts the vertices by place. rest: 3 floats a vertex, finite, copied.
  * NULL: there is no memory. Then, for all vertices, flg_fit_solve; then flg_fit_end. */

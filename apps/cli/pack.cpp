@@ -13,7 +13,7 @@ namespace filigree::cli {
 
 namespace {
 
-enum class Profile { compact, stream, lossless };
+enum class Profile { compact, stream, lossless, runtime };
 
 struct PackArguments {
     std::string input, output;
@@ -39,6 +39,11 @@ void report_coding(const Model& model, const PackReport& coding, const PackArgum
     report.add("vertex error",
                fmt::format("{:.2g} of the diagonal (rms), {:.2g} at most", coding.rms * share, coding.largest * share),
                "vertex_error", {{"rms", coding.rms * share}, {"max", coding.largest * share}});
+    if (options.code.records)
+        report.add("weights",
+                   fmt::format("points on the driver moved by {:.2g} of the diagonal (rms), {:.2g} at most",
+                               coding.anchor_rms * share, coding.anchor_largest * share),
+                   "anchor_error", {{"rms", coding.anchor_rms * share}, {"max", coding.anchor_largest * share}});
     report.count("bytes", "bytes", bytes);
     report.set("seconds", seconds);
 }
@@ -106,7 +111,10 @@ void pack_lossless(const Model& model, const PoseSequence& poses, const PackArgu
 void run(PackArguments options, Session& session) {
     if (mesh_format(path_of(options.output)).ok())
         refuse(options.output + ": is the name of a mesh; give the model another, such as NAME.fil.");
+    if (options.profile == Profile::runtime && (options.code.surface || options.code.keep_order))
+        refuse("--surface and --keep-order are for --profile compact and stream.");
     options.code.levels = options.profile == Profile::stream;
+    options.code.records = options.profile == Profile::runtime;
     if (options.profile == Profile::lossless && options.code != PackOptions())
         refuse("--bits, --surface and --keep-order are for what rounds; --profile lossless keeps every number and "
                "their order.");
@@ -190,9 +198,13 @@ Command pack_command() {
                     output_option(options->output, "Model file to write (.fil)"),
                     choice<Profile>(
                         "--profile", options->profile,
-                        {{"compact", Profile::compact}, {"stream", Profile::stream}, {"lossless", Profile::lossless}},
+                        {{"compact", Profile::compact},
+                         {"stream", Profile::stream},
+                         {"runtime", Profile::runtime},
+                         {"lossless", Profile::lossless}},
                         "compact (default): the smallest file; stream: coarse to fine, so that the first bytes show "
-                        "the whole shape; lossless: keeps every number"),
+                        "the whole shape; runtime: for the C runtime and the npm package, opens at once; lossless: "
+                        "keeps every number"),
                     Option("--bits", options->code.bits, "Bits of a position, along the longest side of the box")
                         .between(10, 16)
                         .with_default(),

@@ -23,6 +23,9 @@ struct PackOptions {
     bool surface = false;
     bool keep_order = false; ///< vertices, faces and first corners keep their order
     bool levels = false;     ///< coarse to fine: every beginning of the file is a mesh
+    /// The file holds how vertices are bound, as the C runtime needs it: reading binds nothing, and weights that were
+    /// not found by binding stay. Without `surface`, `keep_order` and `levels`.
+    bool records = false;
     /// How far restored vertices may be off through poses, fraction of the diagonal (rms); above 0.
     double clip_error = 1e-5;
     bool operator==(const PackOptions&) const = default;
@@ -33,7 +36,8 @@ struct PackedBytes {
     std::uint64_t connectivity = 0, places = 0, attributes = 0, order = 0, driver = 0;
     std::uint64_t levels = 0, refinements = 0; ///< of a stream: its faces and positions
     std::uint64_t clips = 0;                   ///< the poses
-    std::uint64_t records = 0;                 ///< lossless: how vertices are bound to the driver
+    /// lossless: how vertices are bound to the driver; PackOptions::records: that, the mesh and the driver
+    std::uint64_t records = 0;
 };
 
 /// A level of a stream.
@@ -53,6 +57,9 @@ struct Packing {
 
 struct PackReport {
     double rms = 0, largest = 0; ///< distance of vertices from where they were, model units
+    /// PackOptions::records: how far the points of the driver that vertices hang on moved, model units. The mesh at
+    /// rest does not depend on them.
+    double anchor_rms = 0, anchor_largest = 0;
     /// Vertices without a face, more than four boxes away from the others: they come back nearer.
     std::size_t out_of_reach = 0;
     /// Vertex i of the model that is read back is vertex vertex_order[i] of this one. Empty: the order is the same.

@@ -2,58 +2,30 @@
 
 #include "filigree/core/dense_solve.h"
 #include "filigree/pack/symbols.h"
+#include "runtime/rt_clip.h"
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 
 namespace filigree {
 
 namespace {
-
-// Contexts. Curves that matter less have smaller coefficients: so has each its own, and the last ones share.
-constexpr unsigned kCurveContexts = 40, kKinds = 3, kCurveEntry = 2, kCoefficient = kCurveEntry + 2,
-                   kClipContexts = kCoefficient + kCurveContexts * kKinds;
-constexpr std::int32_t kCurveOne = 1 << 19; // entries of curves are shares of it: fine enough for whole positions
-constexpr std::int32_t kLargestCoefficient = 1 << 25;
-
-/// Positions are one kind of numbers, gradients' diagonals another, the rest of them a third.
-unsigned kind_of(std::size_t number) { return number < 3 ? 0 : (number - 3) % 4 == 0 ? 1 : 2; }
-unsigned coefficient_context(std::size_t curve, std::size_t number) {
-    return kCoefficient + unsigned(std::min<std::size_t>(curve, kCurveContexts - 1)) * kKinds + kind_of(number);
-}
 
 void bits_of(SymbolWriter& out, float value) { out.bits(std::bit_cast<std::uint32_t>(value), 32); }
 
 } // namespace
 
 ClipOrder clip_order(std::span<const Index> face_offsets, std::span<const Index> corners, std::size_t vertices) {
-    std::vector<std::vector<Index>> neighbours(vertices);
-    for (std::size_t f = 0; f + 1 < face_offsets.size(); ++f)
-        for (Index c = face_offsets[f]; c < face_offsets[f + 1]; ++c) {
-            const Index a = corners[c], b = corners[c + 1 < face_offsets[f + 1] ? c + 1 : face_offsets[f]];
-            neighbours[a].push_back(b);
-            neighbours[b].push_back(a);
-        }
     ClipOrder order;
-    std::vector<bool> is_known(vertices);
-    for (Index start = 0; start < vertices; ++start) {
-        if (is_known[start]) continue;
-        is_known[start] = true;
-        std::size_t next = order.vertex.size();
-        order.vertex.push_back(start);
-        order.near.push_back(kNoIndex);
-        for (; next < order.vertex.size(); ++next) {
-            std::vector<Index>& around = neighbours[order.vertex[next]];
-            std::ranges::sort(around);
-            for (const Index v : around) {
-                if (is_known[v]) continue;
-                is_known[v] = true;
-                order.near.push_back(order.vertex[next]);
-                order.vertex.push_back(v);
-            }
-        }
-    }
+    order.vertex.resize(vertices);
+    std::vector<Index> beside(vertices), starts(vertices + 1);
+    std::vector<flg_key> keys(4 * corners.size());
+    const flg_faces faces{corners.data(), face_offsets.data(), face_offsets.empty() ? 0 : face_offsets.size() - 1};
+    flg_clip_order(&faces, static_cast<std::uint32_t>(corners.size()), static_cast<std::uint32_t>(vertices),
+                   order.vertex.data(), beside.data(), keys.data(), starts.data());
+    for (const Index v : order.vertex) order.near.push_back(beside[v]);
     return order;
 }
 
@@ -77,7 +49,7 @@ std::string encode_clip(const ClipFrames& frames, std::span<const double> weight
     const double step =
         error * std::sqrt(6.0 * double(count) / double(std::max<std::size_t>(curve_count, 1))); // 12 / 2
 
-    SymbolWriter out(kClipContexts);
+    SymbolWriter out(FLG_CLIP_CONTEXTS);
     out.number(0, static_cast<std::uint32_t>(count));
     out.number(0, static_cast<std::uint32_t>(curve_count));
     bits_of(out, static_cast<float>(step));
@@ -87,11 +59,11 @@ std::string encode_clip(const ClipFrames& frames, std::span<const double> weight
     for (std::size_t c = 0; c < curve_count; ++c) {
         std::int32_t before = 0, slope = 0;
         for (Eigen::Index t = 0; t < count; ++t) {
-            const auto entry = std::int32_t(std::lround(eigenvectors(t, count - 1 - Eigen::Index(c)) * kCurveOne));
-            out.number_with_sign(kCurveEntry + (t > 0), entry - before - slope);
+            const auto entry = std::int32_t(std::lround(eigenvectors(t, count - 1 - Eigen::Index(c)) * double(FLG_CURVE_ONE)));
+            out.number_with_sign(FLG_CURVE_ENTRY + (t > 0), entry - before - slope);
             slope = t > 0 ? entry - before : 0;
             before = entry;
-            curves(t, Eigen::Index(c)) = double(entry) / kCurveOne;
+            curves(t, Eigen::Index(c)) = double(entry) / double(FLG_CURVE_ONE);
         }
     }
     Eigen::MatrixXd coefficients = values * curves;
@@ -103,12 +75,12 @@ std::string encode_clip(const ClipFrames& frames, std::span<const double> weight
         const auto steps = [&](std::size_t v, std::size_t k) {
             const double value = coefficients(Eigen::Index(v * weights.size() + k), Eigen::Index(c)) / step;
             return std::int32_t(
-                std::lround(std::clamp(value, -double(kLargestCoefficient), double(kLargestCoefficient))));
+                std::lround(std::clamp(value, -double(FLG_LARGEST_COEFFICIENT), double(FLG_LARGEST_COEFFICIENT))));
         };
         for (std::size_t i = 0; i < order.vertex.size(); ++i)
             for (std::size_t k = 0; k < weights.size(); ++k) {
                 const std::int32_t expected = order.near[i] != kNoIndex ? steps(order.near[i], k) : 0;
-                out.number_with_sign(coefficient_context(c, k), steps(order.vertex[i], k) - expected);
+                out.number_with_sign(flg_coefficient_context(c, k), steps(order.vertex[i], k) - expected);
             }
     }
     return out.finish();
@@ -116,42 +88,18 @@ std::string encode_clip(const ClipFrames& frames, std::span<const double> weight
 
 std::optional<ClipFrames> decode_clip(std::string_view stream, std::size_t numbers, const ClipOrder& order,
                                       std::size_t most_frames) {
-    SymbolReader in(stream, kClipContexts);
-    const std::size_t count = in.number(0), curve_count = in.number(0), vertices = order.vertex.size();
-    if (in.is_damaged() || count == 0 || count > std::min(most_frames, kClipFrames) || curve_count > count)
+    const std::uint32_t count = flg_clip_frames(stream.data(), stream.size());
+    if (count == 0 || count > most_frames) return std::nullopt;
+    const std::size_t vertices = order.vertex.size(), all = vertices * numbers;
+    std::vector<Index> beside(vertices);
+    for (std::size_t i = 0; i < vertices; ++i) beside[order.vertex[i]] = order.near[i];
+    std::vector<float> block(count * all);
+    std::vector<std::max_align_t> scratch(flg_clip_scratch_bytes(all) / sizeof(std::max_align_t) + 1);
+    if (flg_read_clip(stream.data(), stream.size(), static_cast<std::uint32_t>(numbers), order.vertex.data(),
+                      beside.data(), static_cast<std::uint32_t>(vertices), block.data(), scratch.data()) == 0)
         return std::nullopt;
-    const auto real = [&] { return std::bit_cast<float>(in.bits(32)); };
-    const float step = real();
-    std::vector<float> shares; // of each number, what one step is
-    for (std::size_t k = 0; k < numbers; ++k) shares.push_back(real() * step);
-    if (!std::ranges::all_of(shares, [](float share) { return std::isfinite(share * float(1 << 30)); }))
-        return std::nullopt;
-    std::vector<std::vector<float>> curves(curve_count, std::vector<float>(count));
-    for (std::vector<float>& curve : curves) {
-        std::int32_t before = 0, slope = 0;
-        for (std::size_t t = 0; t < count; ++t) {
-            const std::int64_t entry = std::int64_t{before} + slope + in.number_with_sign(kCurveEntry + (t > 0));
-            if (std::abs(entry) > 2 * kCurveOne) return std::nullopt;
-            slope = t > 0 ? std::int32_t(entry) - before : 0;
-            before = std::int32_t(entry);
-            curve[t] = float(before) / kCurveOne;
-        }
-    }
-    ClipFrames frames(count, std::vector<float>(vertices * numbers, 0.0f));
-    std::vector<std::int32_t> steps(vertices * numbers);
-    for (std::size_t c = 0; c < curve_count; ++c) {
-        for (std::size_t i = 0; i < vertices; ++i)
-            for (std::size_t k = 0; k < numbers; ++k) {
-                const std::int64_t expected = order.near[i] != kNoIndex ? steps[order.near[i] * numbers + k] : 0;
-                const std::int64_t value = expected + in.number_with_sign(coefficient_context(c, k));
-                if (std::abs(value) > kLargestCoefficient || in.is_damaged()) return std::nullopt;
-                steps[order.vertex[i] * numbers + k] = std::int32_t(value);
-            }
-        for (std::size_t t = 0; t < count; ++t)
-            for (std::size_t v = 0; v < vertices; ++v)
-                for (std::size_t k = 0; k < numbers; ++k)
-                    frames[t][v * numbers + k] += curves[c][t] * shares[k] * float(steps[v * numbers + k]);
-    }
+    ClipFrames frames;
+    for (std::size_t t = 0; t < count; ++t) frames.emplace_back(block.begin() + t * all, block.begin() + (t + 1) * all);
     return frames;
 }
 

@@ -1,8 +1,7 @@
 #include "filigree/pack/symbols.h"
 
-#include <algorithm>
+#include <array>
 #include <bit>
-#include <cstring>
 
 namespace filigree {
 
@@ -12,62 +11,14 @@ namespace {
 // rest.
 constexpr unsigned kDirect = 16, kWholeNumber = SymbolModel::kSymbols - 1;
 constexpr unsigned kLargestExponent = 26;
+constexpr std::uint32_t kLowestState = 1u << 16; // states are this to 2^32 - 1
 static_assert(kDirect + (kLargestExponent - 4) * 2 + 1 < kWholeNumber);
-
-constexpr std::array<NumberSymbol, SymbolModel::kSymbols> number_symbols() {
-    std::array<NumberSymbol, SymbolModel::kSymbols> symbols{};
-    for (unsigned s = 0; s < kDirect; ++s) symbols[s] = {s, 0};
-    for (unsigned s = kDirect; s < kWholeNumber; ++s) { // there are none above the largest exponent: damage
-        const unsigned exponent = std::min((s - kDirect) / 2 + 4, kLargestExponent);
-        symbols[s] = {(2 + (s - kDirect) % 2) << (exponent - 1), exponent - 1};
-    }
-    symbols[kWholeNumber] = {0, 32};
-    return symbols;
-}
-
-std::uint32_t without_sign(std::int32_t value) { return (std::uint32_t(value) << 1) ^ (value < 0 ? 0xffffffffu : 0u); }
 
 void put_u32(std::string& bytes, std::uint32_t value) {
     for (unsigned k = 0; k < 4; ++k) bytes.push_back(char(value >> (8 * k)));
 }
-std::uint32_t get_u32(std::string_view bytes, std::size_t at) {
-    std::uint32_t value = 0;
-    for (unsigned k = 0; k < 4; ++k) value |= std::uint32_t(std::uint8_t(bytes[at + k])) << (8 * k);
-    return value;
-}
 
 } // namespace
-
-constinit const std::array<NumberSymbol, SymbolModel::kSymbols> kNumberSymbols = number_symbols();
-
-SymbolModel::SymbolModel() {
-    for (unsigned s = 0; s < kSymbols; ++s) counts_[s] = 1 + (24u >> (s / 6));
-    starts_[kSymbols] = kShares;
-    update();
-    pause_ = until_update_ = 4;
-}
-
-void SymbolModel::update() {
-    std::uint32_t total = 0;
-    for (const std::uint32_t count : counts_) total += count;
-    // One share for each, the others by their counts, rounded down: the half keeps what comes out whole from the
-    // rounding of the quotient.
-    const double one = 1.0 / total;
-    std::uint64_t before = 0;
-    for (unsigned s = 0; s < kSymbols; ++s) {
-        starts_[s] = std::uint16_t(s + std::uint32_t((double(before * (kShares - kSymbols)) + 0.5) * one));
-        before += counts_[s];
-    }
-    unsigned cell = 0;
-    for (unsigned s = 0; s < kSymbols; ++s)
-        for (const unsigned end = unsigned(starts_[s + 1] + (1 << kCoarse) - 1) >> kCoarse; cell < end; ++cell)
-            first_[cell] = std::uint8_t(s);
-    constexpr std::uint64_t kMostCounts = std::uint64_t{kStep} << 15; // what came long ago counts less
-    if (total > kMostCounts)
-        for (std::uint32_t& count : counts_) count = count / 2 + 1;
-    pause_ = std::min(2 * pause_, kLongestPause);
-    until_update_ = pause_;
-}
 
 void SymbolWriter::symbol(unsigned context, unsigned symbol) {
     SymbolModel& model = models_[context];
@@ -92,7 +43,7 @@ void SymbolWriter::number(unsigned context, std::uint32_t value) {
     bits(value, exponent - 1);
 }
 
-void SymbolWriter::number_with_sign(unsigned context, std::int32_t value) { number(context, without_sign(value)); }
+void SymbolWriter::number_with_sign(unsigned context, std::int32_t value) { number(context, flg_without_sign(value)); }
 
 std::string SymbolWriter::finish() {
     if (pending_count_ > 0) bits_.push_back(char(pending_));
@@ -126,35 +77,8 @@ std::string SymbolWriter::finish() {
 SymbolReader::SymbolReader(std::string_view stream, unsigned contexts) : models_(contexts) { read_next(stream); }
 
 void SymbolReader::read_next(std::string_view stream) {
-    turn_ = 0;
-    pending_ = pending_count_ = 0;
-    is_damaged_ = false;
     size_ = stream.size();
-    word_ = words_end_ = bit_ = bits_end_ = nullptr;
-    constexpr std::size_t kHead = 20;
-    if (stream.size() < kHead || get_u32(stream, 0) > (stream.size() - kHead) / 2) {
-        is_damaged_ = true;
-        states_.fill(kLowestState);
-        return;
-    }
-    const std::size_t words = get_u32(stream, 0);
-    for (std::size_t k = 0; k < 4; ++k) states_[k] = get_u32(stream, 4 + 4 * k);
-    word_ = stream.data() + kHead;
-    words_end_ = bit_ = word_ + 2 * words;
-    bits_end_ = stream.data() + stream.size();
-}
-
-/// Byte by byte, where fewer than eight are left.
-void SymbolReader::fetch_last_bits(unsigned count) {
-    while (pending_count_ < count) {
-        if (bit_ == bits_end_) {
-            is_damaged_ = true;
-            pending_count_ += 32;
-            return;
-        }
-        pending_ |= std::uint64_t(std::uint8_t(*bit_++)) << pending_count_;
-        pending_count_ += 8;
-    }
+    flg_symbols_begin(&in_, stream.data(), stream.size());
 }
 
 } // namespace filigree

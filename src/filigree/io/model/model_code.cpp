@@ -114,26 +114,6 @@ PoseSequence with_gradients(const Model& model, const PoseSequence& poses, const
     return filled;
 }
 
-void code_clips(const Model& model, const PoseSequence& poses, double error, PackedModel& coded) {
-    const Level& driver = model.driver();
-    const ClipOrder order = clip_order(driver.face_offsets, driver.corners, driver.vertices.size());
-    coded.clip = {static_cast<std::uint32_t>(poses.frames.size()), poses.frames[0].gradients.empty() ? 3u : 12u};
-    coded.frames_per_second = poses.frames_per_second;
-    const std::size_t numbers = coded.clip.numbers;
-    const double diagonal = world_bounds(model.mesh).diagonal(), unit = diagonal > 0 ? diagonal : 1;
-    std::vector<double> weights(numbers, kGradientReach * unit);
-    std::fill_n(weights.begin(), 3, 1.0);
-    const std::vector<float> rest = clip_numbers(driver_positions(model), {}, numbers);
-    const std::size_t block = most_clip_frames(rest.size()) - 1;
-    for (std::size_t begin = 0; begin < poses.frames.size(); begin += block) {
-        ClipFrames frames = {rest};
-        for (std::size_t f = begin; f < std::min(begin + block, poses.frames.size()); ++f)
-            frames.push_back(clip_numbers(poses.frames[f].positions, poses.frames[f].gradients, numbers));
-        coded.clips.push_back(encode_clip(frames, weights, kClipShare * error * unit, order));
-        coded.report.bytes.clips += coded.clips.back().size();
-    }
-}
-
 /// The faces as fans from their first corners, as they are coded: quads that are not flat have two surfaces.
 Mesh as_fans(const Mesh& mesh) {
     Mesh fans;
@@ -177,6 +157,26 @@ std::vector<FileLevel> levels_of(const PackedMesh& coded, const Mesh& mesh, cons
 }
 
 } // namespace
+
+void code_clips(const Model& model, const PoseSequence& poses, double error, PackedModel& coded) {
+    const Level& driver = model.driver();
+    const ClipOrder order = clip_order(driver.face_offsets, driver.corners, driver.vertices.size());
+    coded.clip = {static_cast<std::uint32_t>(poses.frames.size()), poses.frames[0].gradients.empty() ? 3u : 12u};
+    coded.frames_per_second = poses.frames_per_second;
+    const std::size_t numbers = coded.clip.numbers;
+    const double diagonal = world_bounds(model.mesh).diagonal(), unit = diagonal > 0 ? diagonal : 1;
+    std::vector<double> weights(numbers, kGradientReach * unit);
+    std::fill_n(weights.begin(), 3, 1.0);
+    const std::vector<float> rest = clip_numbers(driver_positions(model), {}, numbers);
+    const std::size_t block = most_clip_frames(rest.size()) - 1;
+    for (std::size_t begin = 0; begin < poses.frames.size(); begin += block) {
+        ClipFrames frames = {rest};
+        for (std::size_t f = begin; f < std::min(begin + block, poses.frames.size()); ++f)
+            frames.push_back(clip_numbers(poses.frames[f].positions, poses.frames[f].gradients, numbers));
+        coded.clips.push_back(encode_clip(frames, weights, kClipShare * error * unit, order));
+        coded.report.bytes.clips += coded.clips.back().size();
+    }
+}
 
 Result<PackedModel> code_model(const Model& model, const PoseSequence& poses, const PackOptions& options,
                                const RunContext& context) {

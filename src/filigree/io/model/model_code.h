@@ -55,6 +55,9 @@ struct PackedModel {
 /// Errors: as pack_model.
 Result<PackedModel> code_model(const Model& model, const PoseSequence& poses, const PackOptions& options,
                                const RunContext& context);
+/// Codes poses as clips: sets clip, frames_per_second, clips, and adds to report.bytes. poses: not empty. error:
+/// PackOptions::clip_error.
+void code_clips(const Model& model, const PoseSequence& poses, double error, PackedModel& coded);
 /// All but pictures and what comes behind them: refinements, and what all of a stream needs. Each refers to `coded`,
 /// which has to outlive the writer.
 void write_model_code(SectionWriter& out, const PackedModel& coded);

@@ -5,6 +5,7 @@
 #include "filigree/io/model/model_code.h"
 #include "filigree/io/model/model_records.h"
 #include "filigree/io/model/model_sections.h"
+#include "filigree/io/model/runtime_code.h"
 #include "filigree/io/system/file.h"
 
 #include "filigree/core/parallel_for.h"
@@ -233,6 +234,7 @@ ModelOutline read_outline_sections(const FileReader& file) {
         outline.across_gap = in.array<Index>("bl.gap");
         outline.facing_away = in.array<Index>("bl.away");
     }
+    if (in.is_decoded()) outline.coding = runtime_coding_of(in);
     read_frames(in, outline);
     outline.bytes = file.size();
     return outline;
@@ -353,6 +355,17 @@ Result<PackReport> pack_model(const Model& model, const PoseSequence& poses, con
     if (const Status fits = check_fits(poses, model, path); !fits) return fits.error();
     context.report("code", 0);
     try {
+        if (options.records) {
+            const Result<RuntimeCode> coded = code_for_runtime(model, poses, options, context);
+            if (!coded) return coded.error();
+            context.report("code", 1);
+            SectionWriter out;
+            write_runtime_code(out, *coded);
+            const std::vector<std::string_view> file = out.finish();
+            if (std::optional<Error> error = too_plain_to_pack(coded->unpacked_bytes, file)) return *error;
+            if (const Status status = write_file(path, file); !status) return status.error();
+            return coded->report;
+        }
         Result<PackedModel> coded = code_model(model, poses, options, context);
         if (!coded) return coded.error();
         context.report("code", 1);

@@ -3,6 +3,7 @@
 // passed over. docs/fil-format.md has every byte.
 #pragma once
 
+#include "filigree/io/model/decoded_sections.h"
 #include "filigree/io/model/lossless_sections.h"
 #include "filigree/io/system/file.h"
 #include "filigree/mesh.h"
@@ -14,6 +15,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <new>
 #include <string>
 #include <utility>
 #include <vector>
@@ -184,6 +186,7 @@ public:
             sections_.emplace(std::pair(name, section.index), section);
         }
         if (sections_.contains({"ll.tab", 0})) open_lossless();
+        if (sections_.contains({"rt.par", 0})) decode();
     }
     SectionReader(const SectionReader&) = delete;
     SectionReader& operator=(const SectionReader&) = delete;
@@ -204,6 +207,10 @@ public:
         if (!section) return {};
         if (lossless_) return items_of<T>(lossless_->bytes(std::string(name), *section));
         std::vector<T> items(section->count);
+        if (const void* decoded = decoded_items(name, index)) {
+            std::memcpy(static_cast<void*>(items.data()), decoded, items.size() * sizeof(T));
+            return items;
+        }
         read(section->offset, std::span(items));
         if (XXH3_64bits(items.data(), items.size() * sizeof(T)) != section->hash)
             throw FileDamage{"has a damaged section " + std::string(name) + " (checksum)"};
@@ -242,7 +249,7 @@ public:
         if (!ids.empty() && ids.back() >= section->count)
             throw FileDamage{"lacks items in section " + std::string(name)};
         std::vector<T> items(ids.size()), piece;
-        if (lossless_) {
+        if (lossless_ || decoded_items(name, index)) {
             const std::vector<T> all = array<T>(name, index);
             for (std::size_t k = 0; k < ids.size(); ++k) items[k] = all[ids[k]];
             return items;
@@ -283,6 +290,9 @@ public:
         return items;
     }
 
+    /// Whether the file is packed with the profile `runtime`. Its sections are then those of the plain file beside the
+    /// packed ones.
+    bool is_decoded() const { return decoded_ != nullptr; }
     bool is_lossless() const { return lossless_ != nullptr; }
     /// Of a lossless file: what each plain section takes, coded.
     std::vector<std::pair<std::string, std::uint64_t>> coded_sizes() const {
@@ -356,6 +366,39 @@ private:
         lossless_ = std::move(lossless);
     }
 
+    void decode() {
+        const DecodedSections::Find find = [this](const std::string& name, std::uint32_t index,
+                                                  std::uint32_t item_size) -> std::optional<std::string> {
+            const auto found = sections_.find({name, index});
+            if (found == sections_.end() || found->second.item_size != item_size) return std::nullopt;
+            std::string bytes(found->second.count * item_size, '\0');
+            read(found->second.offset, std::span(bytes));
+            if (XXH3_64bits(bytes.data(), bytes.size()) != found->second.hash)
+                throw FileDamage{"has a damaged section " + name + " (checksum)", "pack it again"};
+            return bytes;
+        };
+        auto decoded = std::make_unique<DecodedSections>(find, file_.size());
+        if (decoded->failure() == DecodedSections::Failure::no_memory) throw std::bad_alloc();
+        if (decoded->failure() == DecodedSections::Failure::newer)
+            throw FileDamage{"was packed by a later version of filigree", "use a newer program"};
+        if (decoded->failure() == DecodedSections::Failure::damaged)
+            throw FileDamage{"holds a packed model that is damaged", "pack it again"};
+        for (const auto& [key, section] : decoded->all()) {
+            FileSection plain{};
+            plain.index = key.second;
+            plain.item_size = section.item_size;
+            plain.count = section.count;
+            sections_.insert_or_assign(key, plain);
+        }
+        decoded_ = std::move(decoded);
+    }
+    /// Null where the file has the section itself.
+    const void* decoded_items(std::string_view name, std::uint32_t index) const {
+        if (!decoded_) return nullptr;
+        const auto found = decoded_->all().find({std::string(name), index});
+        return found == decoded_->all().end() ? nullptr : found->second.items;
+    }
+
     template <class T>
     static std::vector<T> items_of(const std::string& bytes) {
         std::vector<T> items(bytes.size() / sizeof(T));
@@ -380,6 +423,7 @@ private:
     const FileReader& file_;
     std::map<Key, FileSection> sections_; ///< of equals the first
     std::unique_ptr<Lossless> lossless_;  ///< of a lossless file, whose plain sections these are
+    std::unique_ptr<DecodedSections> decoded_; ///< of a file of the profile `runtime`
 };
 
 } // namespace filigree
