@@ -39,7 +39,7 @@ typedef enum flg_status {
     FLG_NOT_A_MODEL = 2, /* the bytes do not begin as a model does */
     FLG_DAMAGED = 3,     /* cut off, a wrong checksum, or numbers that contradict each other */
     FLG_NEWER = 4,       /* written by a later program: use a later runtime */
-    FLG_UNSUITABLE = 5,  /* a packed model, one with the reference code, or of a program before 0.1.0 */
+    FLG_UNSUITABLE = 5,  /* packed by another profile, with the reference code, or of a program before 0.1.0 */
     FLG_ARGUMENT = 6,    /* NULL, or a number that is out of its range */
     FLG_MISMATCH = 7,    /* another number of driver vertices than the model's */
     FLG_MISSING = 8      /* the model has no such level, section, frame, normals or gradient fit */
@@ -73,7 +73,8 @@ typedef struct flg_options {
     void* user;
 } flg_options;
 
-/* Opens a plain model file, version 2, that lies in memory. `bytes` are copied, and may go afterwards.
+/* Opens a model file, version 2, that lies in memory: plain, or packed with the profile `runtime`. `bytes` are copied,
+ * and may go afterwards.
  * options: NULL means { sizeof(flg_options), 0, FLG_FINEST, 0, NULL, NULL, NULL }.
  * *model: the model, or NULL after an error.
  * Cost: O(size), and one system of 36 equations for each driver vertex. Memory: about 34 bytes a vertex, 12 more with
@@ -127,6 +128,13 @@ const uint32_t* flg_triangle_normals(const flg_model* model);
 const uint32_t* flg_triangle_faces(const flg_model* model);
 /* The vertex of the finest level of each vertex of this one, ascending. NULL at the finest level. */
 const uint32_t* flg_level_vertices(const flg_model* model);
+
+/* Finds UVs ("uv.val"), normals, colours, further numbers, and objects, groups, materials or smoothing groups of faces
+ * ("mat.fac") of a model that is packed with the profile `runtime`, as the sections that the plain file would have
+ * (docs/fil-format.md). Names, materials and pictures are in the file: flg_find_section. The items live as long as the
+ * model. Errors: MISSING (also of a plain model: use flg_find_section), ARGUMENT. */
+flg_status flg_find_decoded(const flg_model* model, const char* name, uint32_t index, const void** items,
+                            uint32_t* item_size, size_t* count);
 
 /* Finds a section of a plain model file: its UVs, colours, materials, names and pictures (docs/fil-format.md lists
  * them). bytes, size: the file, not needed to be open. name: at most 8 characters. index: most have 0.

@@ -995,14 +995,14 @@ static FLG_COLD void add_number(flg_reading* r, const char* name, uint32_t value
 static void add_chunk(flg_reading* r, uint32_t k, uint32_t* starts) {
     enum { BLOCK = 1 << 15, CHUNK = 1 << 18 };
     flg_walk* w = &r->walk;
-    const uint32_t first = k * CHUNK, left = w->vertices - first, count = left < CHUNK ? left : CHUNK,
+    const uint32_t first = k * CHUNK, left = w->vertices - first, count = left < CHUNK ? left : (uint32_t)CHUNK,
                    cells = w->sizes->cells;
     uint32_t *runs = (uint32_t*)take(w, count, 8), run_count = 0;
     uint16_t* from = (uint16_t*)take(w, count, 2);
     float *u = (float*)take(w, count, 4), *v = (float*)take(w, count, 4);
     if (w->status != FLG_OK) return;
     for (uint32_t begin = 0; begin < count; begin += BLOCK) {
-        const uint32_t end = count - begin < BLOCK ? count : begin + BLOCK;
+        const uint32_t end = count - begin < BLOCK ? count : begin + (uint32_t)BLOCK;
         uint32_t at = 0;
         memset(starts, 0, (size_t)cells * sizeof *starts);
         for (uint32_t i = begin; i < end; ++i) ++starts[w->cell_of[first + i]];
@@ -1172,7 +1172,7 @@ static FLG_COLD void read_poses(flg_reading* r, const uint32_t* driver_corners) 
     flg_key* keys;
     flg_faces faces;
     void* scratch;
-    if (!head || w->memory->without_poses || w->status != FLG_OK) return;
+    if (!head || w->status != FLG_OK) return;
     frames = head[0];
     numbers = head[1];
     if ((numbers != 3 && numbers != 12) ||

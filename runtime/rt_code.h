@@ -56,11 +56,11 @@ typedef struct flg_plain_section {
 /* Where sections of the packed file and memory come from. */
 typedef struct flg_code_input {
     void* user;
-    /* The items of a section, with their checksum compared; NULL: there is none, or it is damaged. */
+    /* The items of a section, aligned as their numbers are, with their checksum compared; NULL: there is none, or it is
+     * damaged. */
     const void* (*section)(void* user, const char* name, uint32_t index, uint32_t item, uint64_t* count);
     void* (*take)(void* user, uint64_t count, size_t item); /* memory; NULL: there is none */
     double most_bytes;                                      /* that the model may come to */
-    int without_poses;
 } flg_code_input;
 
 /* The plain sections that a packed file's streams stand for, without names, pictures and what else is in it as it is.

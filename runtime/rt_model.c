@@ -1,5 +1,6 @@
 /* Models: the file's container, opening, and what is restored from. docs/fil-format.md has every byte of a file. */
 #include "filigree_rt.h"
+#include "rt_code.h"
 #include "rt_fit.h"
 #include "rt_hash.h"
 
@@ -30,6 +31,7 @@ typedef struct flg_record_set {
 typedef struct flg_frame {
     uint64_t positions, position_hash, gradients, gradient_hash;
     int has_positions, has_gradients;
+    const void *decoded_positions, *decoded_gradients; /* of a packed model */
 } flg_frame;
 
 /* Memory of the model, one piece behind another; the piece's bytes follow. */
@@ -55,6 +57,7 @@ struct flg_model {
     flg_record_set vertices, corner_normals;
     flg_fit* fit;
     flg_frame* frames;
+    flg_plain_section* decoded; /* of a packed model: what it says beside faces, places and records */
 };
 
 static const char* const status_texts[] = {
@@ -82,7 +85,7 @@ typedef struct flg_file {
     size_t size;
     uint32_t sections;
     uint64_t table_hash;
-    int checks_hashes;
+    int checks_hashes, is_packed;
 } flg_file;
 
 typedef struct flg_section {
@@ -138,6 +141,7 @@ static flg_status read_container(const void* bytes, size_t size, flg_file* file)
             return FLG_DAMAGED;
         end = section.offset + section.count * section.item;
     }
+    file->is_packed = find_section(file, "rt.par", 0, &ignored);
     return find_section(file, "cd.par", 0, &ignored) || find_section(file, "ll.tab", 0, &ignored) ? FLG_UNSUITABLE
                                                                                                   : FLG_OK;
 }
@@ -173,6 +177,7 @@ typedef struct flg_opening {
     flg_file file;
     flg_model* model;
     flg_piece* scratch; /* until opening ends */
+    flg_plain_section* decoded; /* what the streams of a packed model stand for */
     uint32_t flags;
     flg_status status;
     uint32_t all_vertices;         /* in the file: with those of a driver behind the mesh's own */
@@ -220,9 +225,18 @@ static FLG_COLD void release_pieces(const flg_allocator* allocator, flg_piece* p
     }
 }
 
+static FLG_COLD const flg_plain_section* find_decoded(const flg_plain_section* from, const char* name, uint32_t index) {
+    char key[8];
+    make_key(name, key);
+    while (from && (from->index != index || memcmp(from->name, key, 8) != 0)) from = from->next;
+    return from;
+}
+
 /* How many items a section has; 0 where it is missing. */
 static FLG_COLD uint64_t section_count(flg_opening* o, const char* name, uint32_t index, uint32_t item) {
     flg_section section;
+    const flg_plain_section* decoded = find_decoded(o->decoded, name, index);
+    if (decoded) return needs(o, decoded->item == item) ? decoded->count : 0;
     if (o->status != FLG_OK || !find_section(&o->file, name, index, &section)) return 0;
     needs(o, section.item == item);
     return o->status == FLG_OK ? section.count : 0;
@@ -231,6 +245,9 @@ static FLG_COLD uint64_t section_count(flg_opening* o, const char* name, uint32_
 /* Copies all items of a section to memory that has room for them. */
 static FLG_COLD void copy_section(flg_opening* o, const char* name, uint32_t index, void* to) {
     flg_section section;
+    const flg_plain_section* decoded = find_decoded(o->decoded, name, index);
+    if (decoded && o->status == FLG_OK) memcpy(to, decoded->items, (size_t)(decoded->count * decoded->item));
+    if (decoded) return;
     if (o->status != FLG_OK || !find_section(&o->file, name, index, &section)) return;
     if (!needs(o, has_its_hash(&o->file, &section))) return;
     memcpy(to, o->file.bytes + section.offset, (size_t)(section.count * section.item));
@@ -239,7 +256,9 @@ static FLG_COLD void copy_section(flg_opening* o, const char* name, uint32_t ind
 /* All items of a section, borrowed. */
 static FLG_COLD void* read_section(flg_opening* o, const char* name, uint32_t index, uint32_t item, uint64_t* count) {
     void* items;
+    const flg_plain_section* decoded = find_decoded(o->decoded, name, index);
     *count = section_count(o, name, index, item);
+    if (decoded) return o->status == FLG_OK ? decoded->items : NULL;
     items = borrow(o, *count, item);
     if (items) copy_section(o, name, index, items);
     return items;
@@ -810,10 +829,54 @@ static FLG_COLD uint32_t find_frames(flg_opening* o, const char* name, flg_frame
     return count;
 }
 
+/* Keeps what a packed model's streams say beside faces, places and records. */
+static FLG_COLD void keep_decoded(flg_opening* o) {
+    static const char names[][5] = {"uv", "nrm", "col", "scal", "obj", "grp", "mat", "smoo", "pose"};
+    for (const flg_plain_section* from = o->decoded; from; from = from->next) {
+        int is_kept = 0;
+        flg_plain_section* kept;
+        for (size_t k = 0; k < sizeof names / sizeof names[0]; ++k)
+            is_kept |= memcmp(from->name, names[k], strlen(names[k])) == 0;
+        if (!is_kept) continue;
+        kept = (flg_plain_section*)keep(o, 1, sizeof *kept);
+        if (!kept) return;
+        *kept = *from;
+        kept->items = keep(o, from->count, from->item);
+        if (!kept->items) return;
+        memcpy(kept->items, from->items, (size_t)(from->count * from->item));
+        kept->next = o->model->decoded;
+        o->model->decoded = kept;
+    }
+}
+
+static FLG_COLD void find_decoded_frames(flg_opening* o) {
+    flg_model* model = o->model;
+    const flg_plain_section* at;
+    for (at = model->decoded; at; at = at->next) model->info.frames += memcmp(at->name, "pose.pos", 8) == 0;
+    model->frames = (flg_frame*)keep(o, model->info.frames, sizeof(flg_frame));
+    if (!model->frames) return;
+    memset(model->frames, 0, (size_t)model->info.frames * sizeof(flg_frame));
+    for (at = model->decoded; at; at = at->next) {
+        if (memcmp(at->name, "pose", 4) != 0) continue; /* frames count from 0 without a gap, as they are decoded */
+        if (at->name[5] == 'p')
+            model->frames[at->index].decoded_positions = at->items;
+        else
+            model->frames[at->index].decoded_gradients = at->items;
+    }
+    model->info.frames_have_gradients = model->info.frames > 0 && model->frames[0].decoded_gradients;
+    if (model->info.frames == 0) return;
+    read_value(o, "pose.fps", 8, &model->info.frames_per_second);
+    needs(o, model->info.frames_per_second > 0 && model->info.frames_per_second <= DBL_MAX);
+}
+
 static FLG_COLD void read_frames(flg_opening* o) {
     flg_model* model = o->model;
     char key[8];
     uint32_t room = 0, gradients;
+    if (o->file.is_packed) {
+        find_decoded_frames(o);
+        return;
+    }
     make_key("pose.pos", key);
     for (uint32_t k = 0; k < o->file.sections; ++k) {
         const flg_section section = section_at(&o->file, k);
@@ -882,10 +945,44 @@ static FLG_COLD void read_level(flg_opening* o, uint32_t level) {
     model->info.triangles = (uint32_t)triangles;
 }
 
+static FLG_COLD const void* packed_section(void* user, const char* name, uint32_t index, uint32_t item,
+                                           uint64_t* count) {
+    flg_opening* o = (flg_opening*)user;
+    flg_section section;
+    const unsigned char* items;
+    void* copy;
+    *count = 0;
+    if (!find_section(&o->file, name, index, &section) || section.item != item || !has_its_hash(&o->file, &section))
+        return NULL;
+    *count = section.count;
+    items = o->file.bytes + section.offset;
+    if (item == 1) return items;
+    copy = borrow(o, section.count, item); /* aligned */
+    if (copy) memcpy(copy, items, (size_t)(section.count * item));
+    return copy;
+}
+
+static FLG_COLD void* packed_memory(void* user, uint64_t count, size_t item) {
+    return borrow((flg_opening*)user, count, item);
+}
+
+static FLG_COLD void unpack(flg_opening* o) {
+    flg_code_input input;
+    flg_status status;
+    input.user = o;
+    input.section = packed_section;
+    input.take = packed_memory;
+    input.most_bytes = flg_most_unpacked(o->file.size);
+    status = flg_read_code(&input, &o->decoded);
+    if (status != FLG_OK) fails(o, status);
+    keep_decoded(o);
+}
+
 static FLG_COLD void read_model(flg_opening* o, uint32_t level) {
     flg_model* model = o->model;
     uint32_t code = 0, precision = 0, levels = 0, cells = 0;
     uint64_t vertices = 0;
+    if (o->file.is_packed) unpack(o);
     read_value(o, "code", 4, &code);
     if (o->status == FLG_OK && code == 0) fails(o, FLG_UNSUITABLE);
     read_value(o, "levels", 4, &levels);
@@ -988,12 +1085,32 @@ const uint32_t* flg_triangle_normals(const flg_model* model) { return model ? mo
 const uint32_t* flg_triangle_faces(const flg_model* model) { return model ? model->triangle_faces : NULL; }
 const uint32_t* flg_level_vertices(const flg_model* model) { return model ? model->level_vertices : NULL; }
 
+flg_status flg_find_decoded(const flg_model* model, const char* name, uint32_t index, const void** items,
+                            uint32_t* item_size, size_t* count) {
+    const flg_plain_section* found;
+    if (!model || !name || !items || !item_size || !count || strlen(name) > 8) return FLG_ARGUMENT;
+    found = find_decoded(model->decoded, name, index);
+    *items = found ? found->items : NULL;
+    *item_size = found ? found->item : 0;
+    *count = found ? (size_t)found->count : 0;
+    return found ? FLG_OK : FLG_MISSING;
+}
+
 /* A section of the file that was opened, `count` items of so many bytes; NULL: it is damaged. */
 static const unsigned char* opened_section(const flg_model* model, const unsigned char* bytes, uint64_t offset,
                                            uint64_t hash, size_t item) {
     const unsigned char* section = bytes + offset; /* within file_size, as the table was checked */
     const size_t size = item * model->info.driver_vertices;
     return !model->checks_hashes || hash_of(section, size) == hash ? section : NULL;
+}
+
+/* Column by column; files have row after row. */
+static void copy_gradients(const void* from, size_t count, float* gradients) {
+    for (size_t v = 0; v < count; ++v) {
+        float rows[9];
+        memcpy(rows, (const unsigned char*)from + 36 * v, sizeof rows);
+        for (size_t k = 0; k < 9; ++k) gradients[9 * v + k] = rows[k % 3 * 3 + k / 3];
+    }
 }
 
 flg_status flg_read_frame(const flg_model* model, const void* bytes, size_t size, uint32_t frame, float* positions,
@@ -1007,6 +1124,11 @@ flg_status flg_read_frame(const flg_model* model, const void* bytes, size_t size
     if (table_hash != model->table_hash) return FLG_MISMATCH;
     if (frame >= model->info.frames || (gradients && !model->info.frames_have_gradients)) return FLG_MISSING;
     found = model->frames + frame;
+    if (found->decoded_positions) {
+        memcpy(positions, found->decoded_positions, 12 * (size_t)model->info.driver_vertices);
+        if (gradients) copy_gradients(found->decoded_gradients, model->info.driver_vertices, gradients);
+        return FLG_OK;
+    }
     at = opened_section(model, all, found->positions, found->position_hash, 12);
     if (!at) return FLG_DAMAGED;
     memcpy(positions, at, 12 * (size_t)model->info.driver_vertices);
@@ -1014,13 +1136,8 @@ flg_status flg_read_frame(const flg_model* model, const void* bytes, size_t size
     if (!gradients) return FLG_OK;
     at = opened_section(model, all, found->gradients, found->gradient_hash, 36);
     if (!at) return FLG_DAMAGED;
-    for (size_t v = 0; v < model->info.driver_vertices; ++v) { /* the file has row after row */
-        float rows[9];
-        memcpy(rows, at + 36 * v, sizeof rows);
-        if (!all_finite(rows, 9)) return FLG_DAMAGED;
-        for (size_t k = 0; k < 9; ++k) gradients[9 * v + k] = rows[k % 3 * 3 + k / 3];
-    }
-    return FLG_OK;
+    copy_gradients(at, model->info.driver_vertices, gradients);
+    return all_finite(gradients, 9 * (uint64_t)model->info.driver_vertices) ? FLG_OK : FLG_DAMAGED;
 }
 
 flg_status flg_gradients(const flg_model* model, const float* positions, uint32_t driver_vertices, uint32_t first,

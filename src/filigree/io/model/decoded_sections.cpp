@@ -35,7 +35,7 @@ void* take(void* user, std::uint64_t count, std::size_t item) {
 
 DecodedSections::DecodedSections(const Find& find, std::uint64_t file_bytes) {
     Input input{find, memory_};
-    const flg_code_input from{&input, section_of, take, flg_most_unpacked(file_bytes), 0};
+    const flg_code_input from{&input, section_of, take, flg_most_unpacked(file_bytes)};
     flg_plain_section* first = nullptr;
     switch (flg_read_code(&from, &first)) {
     case FLG_OK: break;

@@ -95,7 +95,7 @@ flg_code_input memory_of(Writing& writing) {
                 if (made) writing_of(user).memory.emplace_back(made);
                 return made;
             },
-            std::numeric_limits<double>::infinity(), 0};
+            std::numeric_limits<double>::infinity()};
 }
 
 /// The numbers that faces have, or 0.
