@@ -80,6 +80,18 @@ typedef struct flg_spot {
     uint32_t behind; /* 3: inside */
 } flg_spot;
 
+static FLG_COLD void measure_plane(flg_plane* plane) {
+    double area;
+    plane->aa = plane->ab = plane->bb = 0;
+    for (int k = 0; k < 3; ++k) {
+        plane->aa += plane->edge[0][k] * plane->edge[0][k];
+        plane->ab += plane->edge[0][k] * plane->edge[1][k];
+        plane->bb += plane->edge[1][k] * plane->edge[1][k];
+    }
+    area = plane->aa * plane->bb - plane->ab * plane->ab;
+    plane->inverse = area > 0 && 1 / area <= DBL_MAX ? 1 / area : 0;
+}
+
 static double squared_from(const flg_plane* plane, const double d[3], double u, double v) {
     double squared = 0;
     for (int k = 0; k < 3; ++k) {
@@ -740,7 +752,6 @@ static void make_planes(flg_walk* w) {
     for (uint32_t c = 0; c < cells; ++c) {
         flg_plane* plane = w->planes + c;
         const uint32_t* cell = w->cells + 3 * (size_t)c;
-        double area;
         for (int k = 0; k < 3; ++k) {
             plane->corner[k] = (double)w->driver_rest[3 * (size_t)cell[0] + (size_t)k];
             for (int j = 0; j < 2; ++j)
@@ -748,14 +759,7 @@ static void make_planes(flg_walk* w) {
             plane->beside[k] = FLG_NONE;
             if (plane_edge(cell, k, &keys[count].key)) keys[count++].value = 3 * c + (uint32_t)k;
         }
-        plane->aa = plane->ab = plane->bb = 0;
-        for (int k = 0; k < 3; ++k) {
-            plane->aa += plane->edge[0][k] * plane->edge[0][k];
-            plane->ab += plane->edge[0][k] * plane->edge[1][k];
-            plane->bb += plane->edge[1][k] * plane->edge[1][k];
-        }
-        area = plane->aa * plane->bb - plane->ab * plane->ab;
-        plane->inverse = area > 0 && 1 / area <= DBL_MAX ? 1 / area : 0;
+        measure_plane(plane);
     }
     flg_sort(keys, keys + 3 * (size_t)cells, count);
     for (size_t k = 0; k + 1 < count; ++k) {
@@ -1252,6 +1256,21 @@ flg_status flg_read_code(const flg_code_input* input, flg_plain_section** sectio
 /* ---- Writing ---- */
 
 #ifdef FLG_WITH_WRITER
+void flg_closest_anchor(const float* corner0, const float* corner1, const float* corner2, const float* point,
+                        float* anchor) {
+    flg_plane plane;
+    flg_spot spot;
+    for (int k = 0; k < 3; ++k) {
+        plane.corner[k] = (double)corner0[k];
+        plane.edge[0][k] = (double)corner1[k] - plane.corner[k];
+        plane.edge[1][k] = (double)corner2[k] - plane.corner[k];
+    }
+    measure_plane(&plane);
+    spot = closest_spot(&plane, point);
+    for (int k = 0; k < 3; ++k)
+        anchor[k] = (float)(plane.corner[k] + (spot.u * plane.edge[0][k] + spot.v * plane.edge[1][k]));
+}
+
 flg_status flg_write_code(const flg_code_sizes* sizes, const flg_code_source* source, const flg_code_input* memory) {
     flg_walk w;
     uint32_t* driver_corners;

@@ -104,6 +104,9 @@ typedef struct flg_code_source {
 } flg_code_source;
 enum { FLG_MESH_CONTEXTS = 112, FLG_VALUE_CONTEXTS = 64 };
 
+/* The point of a triangle that is closest to a point. */
+FLG_SHARED void flg_closest_anchor(const float* corner0, const float* corner1, const float* corner2, const float* point,
+                                   float* anchor);
 /* Writes a model's mesh, driver and records: the section "rt.mesh". */
 FLG_SHARED flg_status flg_write_code(const flg_code_sizes* sizes, const flg_code_source* source,
                                      const flg_code_input* memory);

@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// How a .fil is written.
-enum class FitProfile { plain, compact, stream, lossless };
+enum class FitProfile { plain, compact, stream, runtime, lossless };
 
 struct FitArguments {
     std::string input, mesh;
@@ -36,7 +36,13 @@ struct FitArguments {
     PoseFileOptions pose_file;
     AnimationOutput animation;
 
-    bool rounds() const { return profile == FitProfile::compact || profile == FitProfile::stream; }
+    bool bound_weights = false;
+
+    bool rounds() const {
+        return profile == FitProfile::compact || profile == FitProfile::stream || profile == FitProfile::runtime;
+    }
+    /// Whether a packed file binds vertices anew.
+    bool binds_anew() const { return bound_weights || profile == FitProfile::stream || keep_order; }
 };
 
 bool is_fil_path(const std::string& path) { return lower_extension(path_of(path)) == ".fil"; }
@@ -62,7 +68,9 @@ void check(const FitArguments& options, const Session& session) {
     const std::string packing = session.first_given({"--profile", "--bits", "--keep-order"});
     if (!packing.empty() && none(is_fil_path)) refuse(packing + " belongs to a model file; give one with -o NAME.fil.");
     if (const std::string given = session.first_given({"--bits", "--keep-order"}); !given.empty() && !options.rounds())
-        refuse(given + " belongs to --profile compact or stream, which round.");
+        refuse(given + " belongs to --profile compact, stream or runtime, which round.");
+    if (options.keep_order && options.profile == FitProfile::runtime)
+        refuse("--keep-order belongs to --profile compact.");
     if (options.web) return;
     check_animation_options(options.outputs, session);
 }
@@ -145,6 +153,7 @@ private:
         }
         PackOptions pack;
         pack.levels = options_.profile == FitProfile::stream;
+        pack.records = options_.profile == FitProfile::runtime || fitted_.report.has_free_weights;
         pack.keep_order = options_.keep_order;
         pack.bits = options_.bits.value_or(bits_for(options_.fit.error, fitted_.model.mesh));
         pack.clip_error = options_.fit.base ? pack.clip_error : kShareOfPoses * options_.fit.error;
@@ -209,6 +218,7 @@ void report_fit(const FitReport& fit, double seconds, Report& report) {
                            fit.choice == DriverChoice::rest ? "rest shape" : "motion"),
                "driver_vertices", fit.driver_vertices);
     report.set("choice", std::string(name_of(fit.choice)));
+    report.set("free_weights", fit.has_free_weights);
     report.row("error", error_text(fit.rms, fit.max, fit.max_frame, fit.max_vertex));
     report.set("rms", fit.rms);
     report.set("max", fit.max);
@@ -236,6 +246,7 @@ void run(FitArguments options, Session& session) {
         options.fit.rest_frame = require(least_stretched_frame(input.animation, session.context()));
     const double start = now_seconds();
     FitOptions fit = options.fit;
+    if (options.binds_anew()) fit.weight_rounds = 0;
     if (options.rounds() && !fit.base) fit.error = left_for_fit(fit.error);
     const Fitted fitted = require(with_hint(fit_animation(input.animation, fit, session.context()), ErrorCode::mismatch,
                                             "--mesh and the animation belong to one object."));
@@ -299,11 +310,15 @@ Command fit_command() {
                        choice<FitProfile>("--profile", options->profile,
                                           {{"compact", FitProfile::compact},
                                            {"stream", FitProfile::stream},
+                                           {"runtime", FitProfile::runtime},
                                            {"lossless", FitProfile::lossless}},
-                                          "Pack the .fil: compact (the smallest), stream (coarse to fine) or lossless. "
+                                          "Pack the .fil: compact (small), stream (coarse to fine), runtime (opens at "
+                                          "once) or lossless. "
                                           "The error asked for holds for the packed file (default: a plain model)"),
+                       Option("--bound-weights", options->bound_weights,
+                              "Keep the weights that binding gives to vertices: the driver is larger, the fit faster"),
                        Option("--bits", options->bits,
-                              "With --profile compact or stream: bits of a position (default: by the error)")
+                              "With --profile compact, stream or runtime: bits of a position (default: by the error)")
                            .between(10, 16),
                        Option("--keep-order", options->keep_order,
                               "With --profile compact: keep the order of vertices and faces")} +

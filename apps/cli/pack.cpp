@@ -39,7 +39,7 @@ void report_coding(const Model& model, const PackReport& coding, const PackArgum
     report.add("vertex error",
                fmt::format("{:.2g} of the diagonal (rms), {:.2g} at most", coding.rms * share, coding.largest * share),
                "vertex_error", {{"rms", coding.rms * share}, {"max", coding.largest * share}});
-    if (options.code.records)
+    if (coding.has_records)
         report.add("weights",
                    fmt::format("points on the driver moved by {:.2g} of the diagonal (rms), {:.2g} at most",
                                coding.anchor_rms * share, coding.anchor_largest * share),
@@ -127,6 +127,11 @@ void run(PackArguments options, Session& session) {
         require(pack_model(model, poses, options.code, path_of(options.output), session.context()));
     Report report;
     report_coding(model, coding, options, now_seconds() - start, report);
+    if (coding.has_records && !options.code.records)
+        session.warn("The weights of the model were fitted; it is packed with --profile runtime, which keeps them.");
+    if (coding.loses_weights)
+        session.warn("The weights of the model were fitted, and this profile binds vertices anew: poses lose the fit. "
+                     "--profile runtime keeps the weights.");
     if (coding.lacks_level_attributes) session.warn(kLevelsLackAttributes);
     if (coding.out_of_reach > 0)
         session.warn(fmt::format("{} unused {} too far from the mesh to be packed there, and {} back nearer; --profile "

@@ -38,6 +38,9 @@ struct FitOptions {
     std::optional<std::size_t> rest_frame = {};
     /// Unset: what has the least error on some frames.
     std::optional<DriverChoice> choice = {};
+    /// Rounds, at most, in which weights of vertices are moved to where the mesh follows more closely; 0: weights stay
+    /// as vertices were bound. PackOptions::records keeps moved weights; other packed files lose them.
+    unsigned weight_rounds = 3;
 };
 
 /// Distances as fractions of the rest shape's diagonal.
@@ -54,6 +57,7 @@ struct FitReport {
     /// Vertices that lie at one place at rest and part in some frame.
     std::size_t parted = 0;
     std::size_t tries = 0; ///< drivers that were fitted to all frames
+    bool has_free_weights = false; ///< whether weights are not those of binding
 };
 
 struct Fitted {

@@ -65,6 +65,10 @@ struct PackReport {
     /// Vertex i of the model that is read back is vertex vertex_order[i] of this one. Empty: the order is the same.
     std::vector<Index> vertex_order = {};
     PackedBytes bytes;
+    /// Whether the file holds how vertices are bound: PackOptions::records, and without any of `surface`, `keep_order`
+    /// and `levels` also a model whose weights are not those of binding, as those of fit_animation().
+    bool has_records = false;
+    bool loses_weights = false; ///< such weights are lost: the file is packed in another way
     /// The texture coordinates, colours and materials of a stream come with its last byte, as there are too many seams.
     bool lacks_level_attributes = false;
 };

@@ -6,6 +6,7 @@
 #include "filigree/fit/animation_survey.h"
 #include "filigree/fit/driver_family.h"
 #include "filigree/fit/fitted_poses.h"
+#include "filigree/fit/free_weights.h"
 #include "filigree/mesh/normals.h"
 #include "filigree/restore.h"
 
@@ -110,19 +111,20 @@ public:
         std::size_t vertices; ///< that the driver has
         AnimationError error;
     };
-    Result<Tried> try_driver(DriverChoice choice, std::size_t vertices, const RunContext& context) const {
+    Result<Tried> try_driver(DriverChoice choice, std::size_t vertices, unsigned rounds,
+                             const RunContext& context) const {
         Level driver = family_.sample_driver(choice, vertices);
         const std::size_t count = driver.vertices.size();
         std::vector<Level> levels;
         levels.push_back(std::move(driver));
-        const Result<Model> model = bind_to_levels(family_.sample_mesh(), std::move(levels), family_.sample_work(),
-                                                   Precision::float32, context);
+        Result<Model> model = bind_to_levels(family_.sample_mesh(), std::move(levels), family_.sample_work(),
+                                             Precision::float32, context);
         if (!model) return model.error();
         const auto frame = [&](std::size_t k, std::span<Vec3f> positions) -> Status {
             std::ranges::copy(frames_[k], positions.begin());
             return Success{};
         };
-        const Result<FittedPoses> fitted = fit_poses(*model, frames_.size(), frame, {}, context);
+        const Result<FittedPoses> fitted = fit_poses_and_weights(*model, frames_.size(), frame, rounds, context);
         if (!fitted) return fitted.error();
         return Tried{count, fitted->error};
     }
@@ -239,7 +241,7 @@ Status FitWork::choose() {
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t k = 0; k < choices.size(); ++k) {
         if (Status ordered = family_->order(choices[k], shapes, silent_); !ordered) return ordered.error();
-        const Result<Sample::Tried> tried = sample_->try_driver(choices[k], size, silent_);
+        const Result<Sample::Tried> tried = sample_->try_driver(choices[k], size, options_.weight_rounds, silent_);
         if (!tried) return tried.error();
         context_.report("choosing the driver", double(k + 1) / double(choices.size()));
         const double score = goal_.score(tried->error);
@@ -259,7 +261,7 @@ Result<std::size_t> FitWork::size_on_sample() {
     for (std::size_t tries = 0; tries < kMostSampleTries && !search.is_done(); ++tries) {
         context_.report("choosing the size", double(tries) / double(kMostSampleTries));
         const std::size_t size = search.next();
-        const Result<Sample::Tried> tried = sample_->try_driver(choice_, size, silent_);
+        const Result<Sample::Tried> tried = sample_->try_driver(choice_, size, options_.weight_rounds, silent_);
         if (!tried) return tried.error();
         const double score = goal_.score(tried->error);
         if (score > 1 && size >= most_)
@@ -278,7 +280,9 @@ Result<std::size_t> FitWork::size_on_sample() {
 Result<Fitted> FitWork::fit_all(std::size_t vertices) {
     Result<Model> model = bind_to_levels(mesh_, family_->levels(choice_, vertices), work_, Precision::float32, silent_);
     if (!model) return model.error();
-    Result<FittedPoses> poses = fit_poses(*model, animation_.frames, animation_.positions, {}, context_);
+    const std::vector<float> bound_u = model->detail.u, bound_v = model->detail.v;
+    Result<FittedPoses> poses =
+        fit_poses_and_weights(*model, animation_.frames, animation_.positions, options_.weight_rounds, context_);
     if (!poses) return poses.error();
     ++tries_;
     Fitted fitted;
@@ -293,6 +297,7 @@ Result<Fitted> FitWork::fit_all(std::size_t vertices) {
     report.max_vertex = poses->error.max_vertex;
     report.choice = choice_;
     report.parted = survey_.parted;
+    report.has_free_weights = model->detail.u != bound_u || model->detail.v != bound_v;
     fitted.model = *std::move(model);
     fitted.poses = {animation_.frames_per_second, std::move(poses->poses)};
     return fitted;

@@ -355,9 +355,12 @@ Result<PackReport> pack_model(const Model& model, const PoseSequence& poses, con
     if (const Status fits = check_fits(poses, model, path); !fits) return fits.error();
     context.report("code", 0);
     try {
-        if (options.records) {
-            const Result<RuntimeCode> coded = code_for_runtime(model, poses, options, context);
+        const bool is_free = !options.records && has_free_weights(model);
+        const bool keeps_weights = is_free && !options.surface && !options.keep_order && !options.levels;
+        if (options.records || keeps_weights) {
+            Result<RuntimeCode> coded = code_for_runtime(model, poses, options, context);
             if (!coded) return coded.error();
+            coded->report.has_records = true;
             context.report("code", 1);
             SectionWriter out;
             write_runtime_code(out, *coded);
@@ -380,6 +383,7 @@ Result<PackReport> pack_model(const Model& model, const PoseSequence& poses, con
         const double mesh = unpacked_bytes(coded->code) + scalars, clips = unpacked_bytes(coded->clip, coded->code);
         if (std::optional<Error> error = too_plain_to_pack(std::max(mesh, clips), file)) return *error;
         if (const Status status = write_file(path, file); !status) return status.error();
+        coded->report.loses_weights = is_free;
         return coded->report;
     } catch (const Error& error) {
         return error;

@@ -417,6 +417,35 @@ void write_runtime_code(SectionWriter& out, const RuntimeCode& coded) {
     write_pictures(out, coded.rest.embedded_materials);
 }
 
+bool has_free_weights(const Model& model) {
+    const BlendDetail& detail = model.detail;
+    constexpr double kFar = 1e-4;        // of the diagonal
+    constexpr std::size_t kFewOf = 100;  // of so many vertices one may be off
+    const std::vector<Vec3f> driver = driver_positions(model);
+    std::vector<bool> is_poor(model.mesh.vertex_count()); // those are bound otherwise
+    for (const std::vector<Index>* list : {&detail.across_gap, &detail.facing_away})
+        for (const Index v : *list) is_poor[v] = true;
+    const double far = kFar * bounds(model.mesh).diagonal();
+    std::size_t off = 0;
+    for (std::size_t c = 0; c < detail.cells.size(); ++c)
+        for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
+            if (is_poor[detail.order[r]]) continue;
+            float anchor[3];
+            std::array<const float*, 3> corner;
+            for (std::size_t k = 0; k < 3; ++k) corner[k] = driver[detail.cells[c][k]].data();
+            const Vec3f& point = model.mesh.positions[detail.order[r]];
+            flg_closest_anchor(corner[0], corner[1], corner[2], point.data(), anchor);
+            double moved = 0;
+            for (std::size_t k = 0; k < 3; ++k)
+                moved += std::pow((1 - double(detail.u[r]) - double(detail.v[r])) * double(corner[0][k]) +
+                                      double(detail.u[r]) * double(corner[1][k]) +
+                                      double(detail.v[r]) * double(corner[2][k]) - double(anchor[k]),
+                                  2);
+            off += moved > far * far;
+        }
+    return off * kFewOf > detail.order.size();
+}
+
 Packing runtime_coding_of(const SectionReader& in) {
     const auto sizes = in.value<flg_code_sizes>("rt.par");
     Packing packing;

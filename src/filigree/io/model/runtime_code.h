@@ -27,6 +27,10 @@ Result<RuntimeCode> code_for_runtime(const Model& model, const PoseSequence& pos
                                      const RunContext& context);
 void write_runtime_code(SectionWriter& out, const RuntimeCode& coded);
 
+/// Whether vertices hang elsewhere than at the closest point of their cell, as weights that were fitted do. Reading
+/// another packed file would bind them anew. Cost O(V).
+bool has_free_weights(const Model& model);
+
 /// What a file of the profile takes.
 Packing runtime_coding_of(const SectionReader& in);
 
