@@ -21,7 +21,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kManyParticles = 20'000; // more than a usual machine moves 60 times a second
+/// Substeps of particles that a browser makes in a frame, about: with more of them time slows down.
+constexpr double kUsualWork = 300'000;
 constexpr std::size_t kAligned = 8;
 
 /// The page's one file: "FLGPAGE1", the length of a JSON text, the text, then the parts that it names by their place.
@@ -128,7 +129,10 @@ void export_live_page(const SceneFile& scene, const std::string& folder_name, co
     Json head{{"up", std::string(1, "xyz"[int(scene.picture.up)])},
               {"frame_rate", scene.step.frames_per_second},
               {"gravity", numbers(ready.world.gravity)}};
-    const std::string world = require(write_live_world(live_world(scene, ready)));
+    const LiveWorld live = live_world(scene, ready);
+    const std::string world = require(write_live_world(live));
+    Simulation simulation = require(Simulation::create(live.world, live.actors, live.options, session.context()));
+    const unsigned substeps = require(simulation.advance(session.silent_context())).substeps;
     head["world"] = file.add(world);
     head["bodies"] = add_bodies(ready, file, head, session);
     head["obstacles"] = add_obstacles(scene, ready, file);
@@ -143,14 +147,17 @@ void export_live_page(const SceneFile& scene, const std::string& folder_name, co
         particles += body.body->particle_count();
         vertices += body.model.vertex_count();
     }
-    if (particles > kManyParticles)
-        session.warn({fmt::format("The bodies have {} particles; a page keeps up with about {}, and shows more in slow "
-                                  "motion.",
-                                  with_commas(particles), with_commas(kManyParticles))});
+    if (const double work = double(particles) * substeps / kUsualWork; work > 1)
+        session.warn(
+            {fmt::format("A frame takes {} substeps of {} particles, about {:.2g} times what a browser computes "
+                         "in real time; the page then shows slow motion. Softer bodies (young_modulus) and "
+                         "fewer particles take less.",
+                         with_commas(substeps), with_commas(particles), work)});
     const std::string index = (path_of(folder_name) / "index.html").string();
     report.set("output", folder_name);
     report.count("bodies", "bodies", ready.bodies.size());
     report.count("particles", "particles", particles);
+    report.count("substeps", "substeps", substeps);
     report.count("vertices", "vertices", vertices);
     report.count("bytes", "bytes", bytes.size());
     report.count("of that physics", "physics_bytes", world.size());

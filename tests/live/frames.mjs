@@ -19,8 +19,7 @@ const lines = [];
 for (let frame = 0; frame < frames; ++frame) {
   const quarter = Math.floor(frames / 4);
   if (frame === quarter) {
-    const [x, y, z] = world.positions(0);
-    if (world.grab([x + 4, y, z], [-1, 0, 0]) < 0) world.grab([x, y + 4, z], [0, -1, 0]);
+    world.grab(0, [0.125, 0.125, 0.0625], world.positions(0).slice(0, 3));
   }
   if (frame > quarter && frame < Math.floor(frames / 2)) {
     const way = (frame - quarter) / 64;

@@ -55,7 +55,7 @@ int main(int, char** arguments) {
         // quarter.
         if (frame == frames / 4) {
             const float* p = live_positions(0);
-            if (live_grab(p[0] + 4, p[1], p[2], -1, 0, 0) < 0) live_grab(p[0], p[1] + 4, p[2], 0, -1, 0);
+            live_grab(0, 0.125, 0.125, 0.0625, p[0], p[1], p[2]);
         }
         if (frame > frames / 4 && frame < frames / 2) {
             const double way = double(frame - frames / 4) / 64;

@@ -15,12 +15,13 @@ ${CHUNK}
                  * restNormal;
 #endif`;
 
-const corrected = new WeakSet(); // not in userData: a clone would have that, without the function
+// Of a material, also by another copy of this file. Not in userData: a clone would have that, without the function.
+const CORRECTED_BY = Symbol.for("filigree.correctSkinNormals");
 
 /** Makes a material turn the normals of skins as they have to be under stretch. Before it is drawn. */
 export function correctSkinNormals(material) {
-    if (corrected.has(material)) return material;
-    corrected.add(material);
+    if (material[CORRECTED_BY]) return material;
+    material[CORRECTED_BY] = true;
     const before = material.onBeforeCompile, key = material.customProgramCacheKey();
     material.onBeforeCompile = function (shader, renderer) {
         before.call(this, shader, renderer);

@@ -124,16 +124,13 @@ unsigned EXPORTED(particle_count)() {
     return unsigned(count);
 }
 
-/// Takes hold of the first body that a ray hits, where nothing stands before it. direction: of length 1. Returns how
-/// far away it is, m; below 0: there is none.
-double EXPORTED(grab)(double x, double y, double z, double dx, double dy, double dz) {
-    const Vec3d origin(x, y, z), direction(dx, dy, dz);
-    const std::optional<WorldHit> hit = page->simulation.cast_ray(origin, direction);
-    if (!hit || !hit->body) return -1;
-    Hand hand{.body = *hit->body, .point = hit->rest};
-    hand.target.constant = page->wanted = hit->place;
+/// Takes hold of a body. rest: a point on the body at rest, m; x, y, z: where that point is now.
+void EXPORTED(grab)(unsigned body, double rest_x, double rest_y, double rest_z, double x, double y, double z) {
+    Hand hand;
+    hand.body = body;
+    hand.point = Vec3d(rest_x, rest_y, rest_z).cast<float>();
+    hand.target.constant = page->wanted = {x, y, z};
     page->hand = hand;
-    return hit->distance;
 }
 /// Where the hand is at the end of the next frame, m.
 void EXPORTED(move)(double x, double y, double z) { page->wanted = {x, y, z}; }

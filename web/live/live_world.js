@@ -44,8 +44,8 @@ export class LiveWorld {
   advance() { this.guarded(() => this.check(this.calls.advance())); }
   drop_again() { this.guarded(() => this.check(this.calls.drop_again())); }
   set_gravity(gravity) { this.check(this.calls.set_gravity(...gravity)); }
-  /// Takes hold of what a ray hits. direction: of length 1. Returns how far away that is, m; below 0: nothing was hit.
-  grab(origin, direction) { return this.guarded(() => this.calls.grab(...origin, ...direction)); }
+  /// Takes hold of a body. rest: a point on the body at rest, m. place: where that point is now, m.
+  grab(body, rest, place) { this.calls.grab(body, ...rest, ...place); }
   /// Where the hand is at the end of the next frame, m.
   move(place) { this.calls.move(...place); }
   let_go() { this.calls.let_go(); }

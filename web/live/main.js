@@ -45,7 +45,6 @@ class Page {
 
   hear(data) {
     if (data.kind === 'failed') return this.fail(data.message);
-    if (data.kind === 'grabbed') return this.begin_pull(data.distance);
     if (data.kind === 'moved') {
       this.is_waiting = false;
       this.times.step.push(data.milliseconds);
@@ -156,28 +155,16 @@ class Page {
   /// A pointer goes down: on a body it pulls, elsewhere it turns the view.
   press(event) {
     if (this.hand || !event.isPrimary || event.button !== 0) return;
-    const ray = this.ray_at(event);
-    if (!this.live.hit(ray)) return;
+    const ray = this.ray_at(event), hit = this.live.hit(ray);
+    if (!hit) return;
     this.stage.controls.enabled = false;
     element('picture').setPointerCapture(event.pointerId);
-    this.hand = { pointer: event.pointerId, ray, is_held: false };
-    const world = this.live.to_world(ray);
-    this.tell({ kind: 'grab', origin: world.origin.toArray(), direction: world.direction.toArray() });
-  }
-  begin_pull(distance) {
-    if (!this.hand) return this.tell({ kind: 'let_go' }); // it has gone up again
-    if (distance < 0) return;
-    const { ray } = this.hand, at = ray.at(distance, new THREE.Vector3());
     const towards = this.stage.camera.getWorldDirection(new THREE.Vector3());
-    this.hand.plane = new THREE.Plane().setFromNormalAndCoplanarPoint(towards, at);
-    if (this.hand.latest) this.pull(this.hand.latest);
+    this.hand = { pointer: event.pointerId, plane: new THREE.Plane().setFromNormalAndCoplanarPoint(towards, hit.at) };
+    this.tell({ kind: 'grab', body: hit.body, rest: hit.rest.toArray(), place: this.live.to_world(hit.at).toArray() });
   }
   pull(event) {
     if (event.pointerId !== this.hand?.pointer) return;
-    if (!this.hand.plane) {
-      this.hand.latest = event;
-      return;
-    }
     const at = this.ray_at(event).intersectPlane(this.hand.plane, new THREE.Vector3());
     if (!at) return;
     if (this.live.floor !== null) at.y = Math.max(at.y, this.live.floor);
@@ -186,7 +173,7 @@ class Page {
   }
   let_go(event) {
     if (event.pointerId !== this.hand?.pointer) return;
-    if (this.hand.plane) this.tell({ kind: 'let_go' });
+    this.tell({ kind: 'let_go' });
     this.hand = undefined;
     this.stage.controls.enabled = true;
   }
@@ -225,6 +212,8 @@ class Page {
     on('tilt', 'click', () => this.toggle_tilt());
     on('theme', 'click', () => this.set_dark(!this.is_dark));
     on('help-button', 'click', () => element('help').showModal());
+    for (const button of document.querySelectorAll('#actions button, #buttons button'))
+      button.addEventListener('click', ({ detail }) => { if (detail > 0) button.blur(); }); // so that space pauses, and does not click again
     addEventListener('resize', () => this.resize());
     addEventListener('keydown', (event) => this.press_key(event));
   }

@@ -116,24 +116,27 @@ export class LiveScene {
     return ground ? ground.point.clone().applyMatrix4(this.scene.matrixWorld).y : null;
   }
 
-  /// The nearest body that a ray of the picture's axes hits: { distance } by its driver, which is near enough to say
-  /// whether the user means a body. Null: none.
+  /// What a ray of the picture's axes hits first, by the drivers: { body, rest, at }, the number of the body, the point on
+  /// the body at rest (m), and where it is now, in the picture's axes. Null: nothing.
   hit(ray) {
-    const local = ray.clone().applyMatrix4(this.scene.matrixWorld.clone().invert());
-    const [a, b, c, at] = [0, 0, 0, 0].map(() => new THREE.Vector3());
+    const local = this.to_world(ray), [a, b, c, at, shares] = [0, 0, 0, 0, 0].map(() => new THREE.Vector3());
     let nearest = null;
-    for (const { driver, triangles } of this.bodies)
+    this.bodies.forEach(({ model, driver, triangles, scale }, body) => {
+      const corners = (points, t) => [a, b, c].forEach((corner, k) => corner.fromArray(points, 3 * triangles[t + k]));
       for (let t = 0; t < triangles.length; t += 3) {
-        a.fromArray(driver, 3 * triangles[t]);
-        b.fromArray(driver, 3 * triangles[t + 1]);
-        c.fromArray(driver, 3 * triangles[t + 2]);
+        corners(driver, t);
         if (!local.intersectTriangle(a, b, c, false, at)) continue;
         const distance = at.distanceTo(local.origin);
-        if (!nearest || distance < nearest.distance) nearest = { distance };
+        if (nearest && distance >= nearest.distance) continue;
+        THREE.Triangle.getBarycoord(at, a, b, c, shares);
+        corners(model.driverRest, t);
+        const rest = a.clone().multiplyScalar(shares.x).addScaledVector(b, shares.y).addScaledVector(c, shares.z);
+        nearest = { distance, body, rest: rest.multiplyScalar(scale), at: at.clone().applyMatrix4(this.scene.matrixWorld) };
       }
+    });
     return nearest;
   }
-  /// A ray or a point in the world's axes.
+  /// A ray or a point of the picture's axes in the world's.
   to_world(thing) { return thing.clone().applyMatrix4(this.scene.matrixWorld.clone().invert()); }
   direction_to_world(direction) { return direction.clone().applyQuaternion(this.scene.quaternion.clone().invert()); }
 

@@ -31,7 +31,7 @@ const actions = {
     const milliseconds = (performance.now() - start) / frames;
     show('moved', look(buffers), { frames, milliseconds, substeps: world.substeps, contacts: world.contacts, bytes: world.bytes });
   },
-  grab({ origin, direction }) { postMessage({ kind: 'grabbed', distance: world.grab(origin, direction) }); },
+  grab({ body, rest, place }) { world.grab(body, rest, place); },
   move({ place }) { world.move(place); },
   let_go() { world.let_go(); },
   gravity({ gravity }) { world.set_gravity(gravity); },
