@@ -76,7 +76,7 @@ if(FILIGREE_NODE AND bundler)
          ${PROJECT_SOURCE_DIR}/src/filigree/core/* ${PROJECT_SOURCE_DIR}/include/filigree/*)
     file(GLOB runtime_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/runtime/*.[ch] ${web}/filigree/*)
     add_custom_command(
-      OUTPUT ${live}/live.wasm
+      OUTPUT ${live}/live.wasm ${live}/live.wasm.gz
       COMMAND ${PROJECT_SOURCE_DIR}/scripts/wasm ${live}/live.wasm
       DEPENDS ${live_sources} ${PROJECT_SOURCE_DIR}/scripts/wasm
       COMMENT "Compiling the physics of live pages" VERBATIM)
@@ -89,8 +89,8 @@ if(FILIGREE_NODE AND bundler)
         --format=iife --target=es2022 --legal-comments=none --log-level=warning)
     add_custom_command(
       OUTPUT ${web_folder}/live.js ${web_folder}/live.html
-      COMMAND ${bundle} ${web}/live/worker.js --outfile=${live}/worker.txt --loader:.wasm=binary
-              --alias:filigree-live.wasm=${live}/live.wasm
+      COMMAND ${bundle} ${web}/live/worker.js --outfile=${live}/worker.txt --loader:.gz=binary
+              --alias:filigree-live.wasm.gz=${live}/live.wasm.gz
       COMMAND ${bundle} ${web}/live/main.js --outfile=${web_folder}/live.js --loader:.txt=text
               --alias:filigree-live-worker.txt=${live}/worker.txt --alias:filigree=${live}/npm/filigree/filigree.js
               --alias:filigree/three=${live}/npm/filigree/three.js

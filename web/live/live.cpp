@@ -33,7 +33,7 @@ struct Page {
     std::vector<Hand> own_hands; ///< of the scene
 };
 
-const RunContext kContext;
+const RunContext kContext(1);
 std::vector<char> input;
 std::optional<Page> page;
 std::string message;

@@ -1,5 +1,5 @@
 // The worker of a live page: it moves the bodies frame by frame when the page asks, and does in turn what the user did.
-import code from 'filigree-live.wasm';
+import packed from 'filigree-live.wasm.gz';
 import { LiveWorld } from './live_world.js';
 
 let world;
@@ -21,6 +21,7 @@ function show(kind, seen, facts = {}) {
 
 const actions = {
   async open({ world: bytes, obstacles: numbers }) {
+    const code = await new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream('gzip'))).arrayBuffer();
     world = await LiveWorld.open(code, new Uint8Array(bytes));
     obstacles = numbers;
     show('opened', look(), { frame_seconds: world.frame_seconds, particles: world.particles });
