@@ -35,7 +35,7 @@ for (let frame = 0; frame < frames; ++frame) {
   let hash = 2166136261;
   for (let driver = 0; driver < world.sizes.length; ++driver)
     hash = add(add(hash, world.positions(driver)), world.gradients(driver));
-  lines.push(`${frame} ${(hash >>> 0).toString(16).padStart(8, '0')} ${world.substeps} ${world.contacts}`);
+  lines.push(`${frame} ${(hash >>> 0).toString(16).padStart(8, '0')} ${world.substeps} ${world.contacts} ${world.parts}`);
 }
 console.log(lines.join('\n'));
 console.error(`${(milliseconds / frames).toFixed(3)} ms a frame, ${world.particles} particles, ${world.bytes} bytes of memory`);

@@ -75,7 +75,7 @@ int main(int, char** arguments) {
             hash.add(live_positions(driver), 3 * std::size_t(live_driver_size(driver)));
             hash.add(live_gradients(driver), 9 * std::size_t(live_driver_size(driver)));
         }
-        std::printf("%d %08x %u %u\n", frame, hash.value, live_substeps(), live_contacts());
+        std::printf("%d %08x %u %u %u\n", frame, hash.value, live_substeps(), live_contacts(), live_parts());
     }
     std::fprintf(stderr, "%.3f ms a frame, %u particles\n", 1000 * seconds / frames, live_particle_count());
 }

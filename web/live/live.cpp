@@ -117,6 +117,13 @@ int EXPORTED(advance)() {
 }
 unsigned EXPORTED(substeps)() { return page->report.substeps; }
 unsigned EXPORTED(contacts)() { return unsigned(page->report.contacts); }
+/// Parts of all bodies that break, as far as they have come apart.
+unsigned EXPORTED(parts)() {
+    std::size_t count = 0;
+    for (std::size_t body = 0; body < page->simulation.body_count(); ++body)
+        count += page->simulation.fracture(body).parts;
+    return unsigned(count);
+}
 unsigned EXPORTED(particle_count)() {
     std::size_t count = 0;
     for (std::size_t body = 0; body < page->simulation.body_count(); ++body)

@@ -24,6 +24,7 @@ export class LiveWorld {
   get particles() { return this.calls.particle_count(); }
   get substeps() { return this.calls.substeps(); }
   get contacts() { return this.calls.contacts(); }
+  get parts() { return this.calls.parts(); }
   get bytes() { return this.calls.memory.buffer.byteLength; }
 
   check(is_right) {

@@ -48,7 +48,7 @@ class Page {
     if (data.kind === 'moved') {
       this.is_waiting = false;
       this.times.step.push(data.milliseconds);
-      Object.assign(this, { substeps: data.substeps, contacts: data.contacts, physics_bytes: data.bytes });
+      Object.assign(this, { substeps: data.substeps, contacts: data.contacts, parts: data.parts, physics_bytes: data.bytes });
       this.simulated = (this.simulated ?? 0) + data.frames * this.frame_seconds;
       this.spare = this.before === this.latest ? undefined : this.before;
       this.before = this.latest;
@@ -134,7 +134,7 @@ class Page {
     const count = (number) => number.toLocaleString('en'), least = (list) => (list.length ? median(list).toFixed(2) : '-');
     const rows = [['particles', count(this.particles)], ['driver vertices', count(this.live.driver_vertices)],
       ['vertices', count(this.live.vertices)], ['triangles', count(this.live.triangles)],
-      ['substeps', this.substeps ?? '-'], ['contacts', this.contacts ?? '-'],
+      ['substeps', this.substeps ?? '-'], ['contacts', this.contacts ?? '-'], ...(this.parts > 0 ? [['parts', this.parts]] : []),
       ['physics, ms a frame', least(this.times.step)], ['pose, ms', least(this.times.pose)],
       ['picture, ms', least(this.times.draw)], ['pictures a second', this.times.frame.length ? (1000 / median(this.times.frame)).toFixed(0) : '-'],
       ['speed', this.rate.toFixed(2)], ['memory of the physics', `${((this.physics_bytes ?? 0) / 1e6).toFixed(1)} MB`],

@@ -30,7 +30,7 @@ const actions = {
     const start = performance.now();
     for (let frame = 0; frame < frames; ++frame) world.advance();
     const milliseconds = (performance.now() - start) / frames;
-    show('moved', look(buffers), { frames, milliseconds, substeps: world.substeps, contacts: world.contacts, bytes: world.bytes });
+    show('moved', look(buffers), { frames, milliseconds, substeps: world.substeps, contacts: world.contacts, parts: world.parts, bytes: world.bytes });
   },
   grab({ body, rest, place }) { world.grab(body, rest, place); },
   move({ place }) { world.move(place); },
