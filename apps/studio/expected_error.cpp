@@ -44,6 +44,8 @@ ExpectedError::ExpectedError(Workbench& workbench) : workbench_(workbench) {
 
 QString ExpectedError::warning() const {
     if (!estimate_ || !estimate_->is_too_curved()) return {};
+    const auto& recording = workbench_.state().recording;
+    if (workbench_.mode() == Mode::body && recording && recording->fitted) return {}; // that was measured
     return QStringLiteral("The pose is more curved than the driver can follow: the mesh is off by about %1 % of the "
                           "diagonal. Choose a larger driver (Detail, Size).")
         .arg(number_text(100 * estimate_->share(), 2));

@@ -99,7 +99,7 @@ QDialog* make_export_sheet(Workbench& workbench, std::function<void(const QStrin
         go_on(extension);
     });
     QObject::connect(buttons, &QDialogButtonBox::rejected, sheet, &QDialog::reject);
-    sheet->resize(420, 330);
+    sheet->resize(420, 250);
     return sheet;
 }
 

@@ -58,13 +58,13 @@ Result<std::shared_ptr<const DroppedBody>> softened(std::shared_ptr<const Droppe
     for (const float one : *softness) factors.push_back(1 + float(state.body.softest - 1) * one);
     Result<std::vector<float>> cells = spread_inwards(*made->body, state.source->mesh, factors, context);
     if (!cells) return cells.error();
-    Body body = *made->body;
+    filigree::Body body = *made->body;
     BodyFields fields = body.fields;
     fields.stiffness = std::move(*cells);
     if (const Status set = set_fields(body, std::move(fields)); !set) return set.error();
     if (const std::string warning = fields_warning(body); !warning.empty())
         soft->report.warning += (soft->report.warning.empty() ? "" : " ") + warning;
-    soft->body = std::make_shared<const Body>(std::move(body));
+    soft->body = std::make_shared<const filigree::Body>(std::move(body));
     return std::shared_ptr<const DroppedBody>(std::move(soft));
 }
 

@@ -3,7 +3,7 @@
 What is where: `library` finds the Python module; `settings` is what a file stores; `meshes` moves arrays between
 Blender and numpy; `models` keeps models in the file; `nodes` shows the restored shape; `follow` restores when Blender
 says that something moved; `jobs` runs long work; `binding`, `baking`, `error_map`, `simulating` (with
-`obstacles` and their `turning`), `breaking` and `fitting` are the panel's buttons; `panel` draws them.
+`obstacles` and their `turning`), `breaking`, `fitting` and `fleshing` are the panel's buttons; `panel` draws them.
 """
 
 bl_info = {
@@ -16,9 +16,9 @@ bl_info = {
     "category": "Animation",
 }
 
-from . import baking, binding, breaking, error_map, fitting, follow, panel, settings, simulating
+from . import baking, binding, breaking, error_map, fitting, fleshing, follow, panel, settings, simulating
 
-_PARTS = (settings, binding, baking, error_map, simulating, breaking, fitting, panel, follow)
+_PARTS = (settings, binding, baking, error_map, simulating, breaking, fitting, fleshing, panel, follow)
 
 
 def register():

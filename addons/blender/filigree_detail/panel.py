@@ -115,7 +115,27 @@ class FILIGREE_PT_body(_Panel, bpy.types.Panel):
         layout.operator("filigree.fracture", icon="MOD_EXPLODE")
 
 
-_CLASSES = (FILIGREE_PT_detail, FILIGREE_PT_body)
+class FILIGREE_PT_flesh(_Panel, bpy.types.Panel):
+    bl_idname = "FILIGREE_PT_flesh"
+    bl_label = "Flesh"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return FILIGREE_PT_body.poll(context)
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        flesh = context.scene.filigree_flesh
+        for name in ("stiffness", "damping", "particles", "joints", "loop"):
+            layout.prop(flesh, name)
+        layout.prop_search(flesh, "soft_group", context.object, "vertex_groups")
+        layout.operator("filigree.flesh", icon="ARMATURE_DATA")
+
+
+_CLASSES = (FILIGREE_PT_detail, FILIGREE_PT_body, FILIGREE_PT_flesh)
 
 
 def register():
