@@ -76,7 +76,7 @@ def picture(path):
         scene.collection.objects.link(obj)
     scene.camera = camera
     width = int(os.environ.get("WIDTH", 1200))
-    scene.render.resolution_x, scene.render.resolution_y = width, width * 3 // 8
+    scene.render.resolution_x, scene.render.resolution_y = width, width // 4
     scene.render.engine = "CYCLES"
     scene.cycles.samples = int(os.environ.get("SAMPLES", 24))
     scene.cycles.use_denoising = False

@@ -11,6 +11,7 @@
 #include <QMessageBox>
 #include <QMimeData>
 #include <QPushButton>
+#include <QSettings>
 #include <QTemporaryDir>
 #include <QTest>
 #include <QTimer>
@@ -303,6 +304,21 @@ TEST_F(Window, AMessageCanOfferAButton) {
     EXPECT_TRUE(offer.isHidden());
     offer.click(); // what was offered before is gone
     EXPECT_FALSE(workbench().state().handles.empty());
+}
+
+TEST_F(Window, TheMouseAndTheCameraAreRemembered) {
+    QSettings::setPath(QSettings::NativeFormat, QSettings::UserScope, folder.path()); // not the user's own
+    const auto leave_with = [](bool on) {
+        MainWindow one(true);
+        one.workbench().view().edit([&](ViewSettings& view) { view.blender_mouse = view.follow = on; });
+        one.close();
+    };
+    for (const bool on : {true, false}) {
+        leave_with(on);
+        MainWindow next(true);
+        EXPECT_EQ(next.workbench().view().settings().blender_mouse, on);
+        EXPECT_EQ(next.workbench().view().settings().follow, on);
+    }
 }
 
 TEST_F(Window, TheExportSheetAsksForWhatMatters) {
