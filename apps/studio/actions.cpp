@@ -445,9 +445,9 @@ struct Actions::Impl {
 
     void open_motion() {
         dialogs.ask({"fit.open", "Open an animation", {kMoving, kAll}}, [this](const QString& path) {
-            const bool replaces = !is_point_cache(path.toStdString()); // a cache moves what is there
+            const bool replaces = !is_point_cache(path.toStdString()); // a cache moves the mesh there is
             if (replaces && !window.may_discard()) return;
-            window.show_panel("fit");
+            if (window.panel() != "flesh") window.show_panel("fit");
             workbench.open_motion(path.toStdString());
         });
     }

@@ -58,11 +58,10 @@ public:
         check(rows, glb.setting("export.all_levels", "Coarser levels too",
                                 "Viewers that know MSFT_lod draw a coarser level when the object is small",
                                 field(&GlbSettings::all_levels), is_glb));
-        check(rows,
-              glb.setting("export.compress", "Compress",
-                          "About a third of the size, for viewers that know EXT_meshopt_compression (three.js and "
-                          "Babylon.js do; Blender does not)",
-                          field(&GlbSettings::compress), is_glb));
+        check(rows, glb.setting("export.compress", "Compress",
+                                "A smaller file, for viewers that know EXT_meshopt_compression and "
+                                "KHR_mesh_quantization",
+                                field(&GlbSettings::compress), is_glb));
         check(rows,
               glb.setting("export.six_joints", "Six joints a vertex, for Blender",
                           "The rest shape is then the true one; else its detail is twice as high, which shows only "

@@ -3,6 +3,7 @@
 #include "controls.h"
 #include "icons.h"
 #include "message_bar.h"
+#include "motion_file.h"
 #include "panels/panels.h"
 #include "tools/tool.h"
 #include "words.h"
@@ -368,7 +369,8 @@ QString MainWindow::file_path() const { return impl_->file_path; }
 QStringList MainWindow::recent_files() const { return impl_->recent; }
 
 void MainWindow::open_file(const QString& path) {
-    if (may_discard()) impl_->workbench->open(path.toStdString());
+    const bool replaces = !is_point_cache(path.toStdString()); // a cache moves the mesh there is
+    if (!replaces || may_discard()) impl_->workbench->open(path.toStdString());
 }
 
 void MainWindow::save_file(const QString& path) {

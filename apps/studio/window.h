@@ -22,7 +22,7 @@ public:
 
     /// One of kPanels (panels/panels.h); false: there is none of that name.
     bool show_panel(const QString& name);
-    /// Opens a file as the dialog would: asks first when there are unsaved changes.
+    /// Opens a file as the dialog would: asks first when there are unsaved changes that it would replace.
     void open_file(const QString& path);
     /// Stops what moves and asks about unsaved changes; false: the user wants to stay.
     bool may_discard();
