@@ -215,8 +215,9 @@ Camera PictureCamera::camera_of_frame(std::size_t frame) {
         const auto latest = std::size_t(std::ceil(kLatest * workbench_.frames_per_second()));
         const std::size_t first = frame + 1 > latest ? frame + 1 - latest : 0;
         Camera now = motion_cameras(workbench_, first, frame + 1, camera(), tile_size().aspect()).back();
-        if (!followed_) return now;
-        const double share = 1 - std::exp(-1 / (kLag * workbench_.frames_per_second()));
+        const std::size_t before_this = std::exchange(followed_frame_, frame); // frames may have been left out since
+        if (!followed_ || frame < before_this) return now;
+        const double share = 1 - std::exp(-double(frame - before_this) / (kLag * workbench_.frames_per_second()));
         const Vec3d before = followed_->target - aside_;
         const double reach = zoom_ * distance(*followed_) + share * (distance(now) - zoom_ * distance(*followed_));
         now.target = before + share * (now.target - before);

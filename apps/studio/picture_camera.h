@@ -73,6 +73,7 @@ private:
 
     // Along with what moves:
     std::optional<Camera> followed_; ///< as it was set last; none: it does not go along
+    std::size_t followed_frame_ = 0; ///< while a body moved
     double zoom_ = 1;                ///< of the user, over what all is seen from
     Vec3d aside_ = Vec3d::Zero();    ///< that the user moved the view
     std::vector<Camera> track_;      ///< of the whole recording
