@@ -193,7 +193,7 @@ TEST(OwnCells, FindWhatBruteForceFinds) {
     const auto compare = [&](const Body& body, const Vectors& positions) {
         const Matter matter(body);
         const OwnCells cells(matter);
-        const std::vector<Index> found = cells.find(positions, {}, reach, RunContext(2));
+        const std::vector<Index> found = cells.find(positions, {}, reach, nullptr, RunContext(2));
         Vectors points(found.size());
         for (Index s = 0; s < points.size(); ++s) points.set(s, embedded_point(body.surface.points, s, positions));
         std::size_t hits = 0;
@@ -265,7 +265,7 @@ TEST(OwnCells, FindWhatIsFolded) {
     EXPECT_TRUE(cells.folds(bar.rest, 0, RunContext(2)).empty());
     const auto compare = [&](const Vectors& folded) {
         const OwnCells::Folds folds = cells.folds(folded, 0, RunContext(2));
-        const std::vector<Index> found = cells.find(folded, folds, 0.01f, RunContext(2));
+        const std::vector<Index> found = cells.find(folded, folds, 0.01f, nullptr, RunContext(2));
         std::size_t hits = 0;
         for (Index s = 0; s < bar.surface.points.size(); ++s) {
             const Vec3f point = embedded_point(bar.surface.points, s, folded);

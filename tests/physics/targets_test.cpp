@@ -251,26 +251,6 @@ TEST(Targets, OtherElasticModelsFollowToo) {
     }
 }
 
-TEST(Targets, GroupsThatPassDoNotTouch) {
-    const Motion folds = [](const Vec3d& rest, double t) { // the upper half comes down through the lower
-        return rest.y() > 0.05 ? Vec3d(rest - Vec3d(0, 0.3 * std::min(1.0, 4 * t), 0)) : rest;
-    };
-    const auto most_contacts = [&](bool pass) {
-        Following one(block(3, 10, 3, 0.05, material(MaterialModel::fem, 2e4)), folds, 20);
-        if (pass) {
-            for (std::size_t i = 0; i < one.body().particle_count(); ++i)
-                one.follow.groups.push_back(one.body().rest[i].y() > 0 ? 1 : 0);
-            one.follow.passing = {{0, 1}, {0, 0}, {1, 1}};
-        }
-        one.begin();
-        std::size_t most = 0;
-        for (int frame = 0; frame < 20; ++frame) most = std::max(most, one.step().contacts);
-        return most;
-    };
-    EXPECT_GT(most_contacts(false), 0u);
-    EXPECT_EQ(most_contacts(true), 0u);
-}
-
 TEST(Targets, WithoutAnEndTheyStop) {
     Following one(arm(), swinging(1, 0.5), kHeld);
     one.begin();
