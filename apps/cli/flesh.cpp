@@ -205,7 +205,10 @@ private:
         const std::string extension = lower_extension(path_of(options_.input));
         if (!character.rest && (extension == ".pc2" || extension == ".mdd" || extension == ".usda"))
             refuse(options_.input + ": has positions alone; --mesh FILE gives the mesh that it moves.");
-        return require(read_character(path_of(options_.input), character, session_.context()));
+        Result<SkinnedMesh> skin = read_character(path_of(options_.input), character, session_.context());
+        if (!skin && skin.error().code == ErrorCode::unsuitable && !skin.error().message.starts_with(options_.input))
+            throw Failure{{skin.error().code, options_.input + ": " + skin.error().message}};
+        return require(std::move(skin));
     }
 
     FleshClipOptions clip_options() const {

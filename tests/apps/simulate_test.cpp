@@ -551,7 +551,7 @@ TEST_F(Simulate, TheExamplesRun) {
         EXPECT_GT(json["least_volume_ratio"], 0.5);
         EXPECT_EQ(json["warnings"], Json::array());
     }
-    std::vector<std::string> brought = {"koala_drop", "koala_sit"}; // meshes that a user has to bring
+    std::vector<std::string> brought = {"koala_drop", "koala_sit", "creature"}; // meshes that a user has to bring
     if (all_cases()) brought.push_back("dragon_pull");
     for (const std::string& name : brought) {
         const std::string scene = FILIGREE_ROOT "/examples/scenes/" + name + ".toml";

@@ -83,7 +83,7 @@ TEST_F(SceneRunTest, ABodyFollowsACharacter) {
         const Result<ReadyScene> ready = set_up(*read, kOneThread);
         return ready ? std::string() : ready.error().message;
     };
-    EXPECT_NE(refused(text + "core = 3\n").find(":11:"), std::string::npos);
+    EXPECT_NE(refused(text + "core = 3\n").find(":12:"), std::string::npos);
     EXPECT_NE(refused(text + "[[follow.joint]]\nname = \"hand\"\n").find("'upper', 'lower'"), std::string::npos);
     EXPECT_NE(refused(text + "[[follow.joint]]\nstrong = 1\n").find("[[follow.joint]]"), std::string::npos);
     EXPECT_NE(refused(text + "[[follow.limb]]\nname = \"hand\"\n").find("limb"), std::string::npos);
