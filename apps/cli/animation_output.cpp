@@ -49,13 +49,23 @@ void report_frames(std::size_t frames, double rate, std::size_t vertices, Report
 }
 
 std::string error_text(const ExportReport& exported, bool is_skin) {
-    std::string error =
-        fmt::format("{:.1e} of the diagonal at keys (rms {:.1e})", exported.error_at_keys, exported.rms_at_keys);
+    std::string error = fmt::format("the farthest vertex is off by {:.1e} of the diagonal at keys (rms {:.1e})",
+                                    exported.error_at_keys, exported.rms_at_keys);
     if (is_skin)
-        error +=
-            fmt::format(", {:.1e} between them (rms {:.1e})", exported.error_between_keys, exported.rms_between_keys);
-    return fmt::format("{}; {} of {} moments evaluated", error, with_commas(exported.moments_checked),
+        error += fmt::format(", by {:.1e} between keys (rms {:.1e})", exported.error_between_keys,
+                             exported.rms_between_keys);
+    return fmt::format("{}; {} of {} moments measured", error, with_commas(exported.moments_checked),
                        with_commas(exported.moments));
+}
+
+/// Whom the file's normals show wrong, and what to do; nothing below a few degrees, which nobody sees.
+std::string normals_text(double degrees) {
+    constexpr double kSeen = 5;
+    if (degrees < kSeen) return "right in three.js; in Blender, import with Shading: Smooth";
+    return fmt::format("turned too far in three.js where the mesh stretches: by less than {:.3g} degrees "
+                       "at 95 % of the driver. --no-normals shades flat and right; docs/exchange.md has a line for "
+                       "three.js. In Blender, import with Shading: Smooth",
+                       degrees);
 }
 
 /// What an export as skin or morph targets came to.
@@ -70,9 +80,7 @@ void report_export(const ExportReport& exported, bool is_skin, bool has_normals,
                "as", is_skin ? "skin" : "morph");
     if (exported.moments_checked > 0) report.row("error of the file", error_text(exported, is_skin));
     if (has_normals && exported.normal_error_degrees > 0)
-        report.row("normals", fmt::format("95 % are off by less than {:.3g} degrees in viewers such as three.js; in "
-                                          "Blender, import with Shading: Smooth (docs/exchange.md)",
-                                          exported.normal_error_degrees));
+        report.row("normals", normals_text(exported.normal_error_degrees));
     report.set("vertices", exported.vertices);
     report.set("joints", exported.joints);
     report.set("keys", exported.keys);

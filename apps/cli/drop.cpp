@@ -2,6 +2,7 @@
 #include "drop.h"
 
 #include "commands.h"
+#include "draft.h"
 #include "drawing.h"
 #include "live_page.h"
 #include "pictures.h"
@@ -222,6 +223,7 @@ Command drop_command() {
                         .whole_from(8)
                         .with_default(),
                     Option("--duration", options->duration, "Length, s").above_zero().with_default(),
+                    Option("--draft", options->run.draft, kDraftHelp),
                     Option("--scene", options->scene,
                            "Write the scene as a file too, to change it and run it with 'filigree simulate'")
                         .is_written(),

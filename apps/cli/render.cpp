@@ -1,5 +1,6 @@
 #include "chunks.h"
 #include "commands.h"
+#include "draft.h"
 #include "rendering.h"
 
 #include "filigree/io/system/numbered_name.h"
@@ -146,7 +147,9 @@ OptionList page_options(RenderOptions& options) {
 
 OptionList film_options(RenderOptions& options) {
     return {
-        Option("--poses", options.poses, "Moved drivers of a model, one mesh per frame (PLY may have gradients)")
+        Option("--poses", options.poses,
+               "Motion of a model's driver: one mesh per frame (PLY may have gradients), or one .pc2, .mdd, animated "
+               "glTF, pose_####.ply or model with poses")
             .is_read(),
         Option("--turntable", options.turntable, "Make a film that goes once around the object"),
         Option("--frames", options.frames, "Number of frames of a turntable").whole_from(1).with_default(),
@@ -157,6 +160,7 @@ OptionList film_options(RenderOptions& options) {
                "Draw pose N that the model holds, from 1 (default: a film plays all poses, a picture shows the model "
                "at rest)")
             .whole_from(1),
+        Option("--draft", options.draft, kDraftHelp),
         Option("--fps", options.frames_per_second, "Frames per second (default: the rate of the model's poses, or 30)")
             .above_zero(),
         Option("--passes", options.passes,
@@ -165,8 +169,24 @@ OptionList film_options(RenderOptions& options) {
             .whole_from(1)};
 }
 
-void run(const RenderOptions& options, Session& session) {
+/// Whether one file holds a motion, not a moment.
+bool is_motion(const std::string& path) {
+    const std::string ending = lower_extension(path_of(path));
+    return path.find('#') != std::string::npos || ending == ".pc2" || ending == ".mdd" || ending == ".glb" ||
+           ending == ".gltf" || ending == ".fil";
+}
+
+void run(RenderOptions options, Session& session) {
     const bool is_film = is_film_path(path_of(options.output));
+    if (options.draft && !is_film) refuse("--draft is of films; let -o end in .mp4, .gif or _%04d.png.");
+    if (options.poses.size() == 1 && is_motion(options.poses[0])) {
+        if (options.files.size() != 1) refuse("--poses move one model; give one model file.");
+        options.motion = options.poses[0];
+        options.poses.clear();
+        if (!is_film && options.frame == 0)
+            refuse(options.motion + ": is a motion, and a picture shows one moment of it; say which with --frame, or "
+                                    "give -o a film's name.");
+    }
     check(options, is_film);
     is_film ? render_film(options, session) : render_still(options, session);
 }

@@ -1,5 +1,6 @@
 // Films: what changes from frame to frame is the pose, the file or the camera.
 #include "chunks.h"
+#include "draft.h"
 #include "rendering.h"
 
 #include "filigree/io/system/file_batch.h"
@@ -36,6 +37,10 @@ public:
         if (is_own_ && has_scalars() && options.scalar != "level") refuse(kPosesWithoutScalars);
         frames_ = options.turntable ? std::max<std::size_t>(options.frames, moments_) : moments_;
         if (options.size.width) size_ = options.size;
+        if (options.draft) {
+            const auto [width, height] = draft_size({size_.width, size_.height});
+            size_ = {width, height};
+        }
         if (size_.width <= legend_width() + 16 || size_.height < 16) refuse("--size: too small for a film.");
     }
 
@@ -48,10 +53,11 @@ public:
         prepare();
         require(film_frames(
             frames_, [&](std::size_t frame, const RunContext& quiet) { return draw(frame, quiet); },
-            std::span(&writer, 1), "filming", context()));
+            std::span(&writer, 1), fmt::format("filming {} frames", frames_), context()));
         session_.begin_writing(options_.output);
         require(writer.finish());
-        report(fmt::format("{} frames of ", frames_), size_, frames_, now_seconds() - start);
+        report(fmt::format("{}{} frames of ", options_.draft ? "a draft of " : "", frames_), size_, frames_,
+               now_seconds() - start);
     }
 
 private:
@@ -178,7 +184,7 @@ private:
         scene.ground_level = extent_.ground_level(up_);
         const Camera seen = options_.turntable ? turned(camera_, 360.0 * double(frame) / double(frames_)) : camera_;
         PictureOptions picture = picture_options(size_.width - legend_width(), size_.height);
-        if (!picture.passes) picture.passes = 12;
+        if (!picture.passes) picture.passes = options_.draft ? kDraftPasses : 12;
         Result<Picture> drawn = renderer_.picture(scene, seen, picture, quiet);
         if (!drawn || !has_scalars()) return drawn;
         Page page(size_.width, size_.height);

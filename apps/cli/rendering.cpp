@@ -1,4 +1,5 @@
 #include "rendering.h"
+#include "animation_output.h"
 #include "filigree/blend/blend_code.h"
 #include "filigree/io/system/file.h"
 
@@ -42,6 +43,7 @@ std::unique_ptr<Subject> Rendering::read(const std::string& path) {
     if (auto* model = std::get_if<Model>(&content.value)) {
         subject->model = std::move(*model);
         subject->poses = std::move(content.poses);
+        if (!options_.motion.empty()) subject->poses = read_motion(*subject->model, path);
         if (options_.frame > 0) own_pose(subject->poses, options_.frame, path);
         const unsigned level = options_.restore.level.value_or(subject->model->finest_level());
         if (level > subject->model->finest_level())
@@ -49,7 +51,7 @@ std::unique_ptr<Subject> Rendering::read(const std::string& path) {
                                level));
         subject->mesh = level_mesh(*subject->model, level);
     } else {
-        if (!options_.poses.empty() || options_.frame > 0)
+        if (!options_.poses.empty() || !options_.motion.empty() || options_.frame > 0)
             refuse(path + ": is a mesh, and --poses and --frame move a model; 'filigree strip' makes one of it.");
         subject->mesh = std::move(std::get<Mesh>(content.value));
     }
@@ -57,9 +59,17 @@ std::unique_ptr<Subject> Rendering::read(const std::string& path) {
     return subject;
 }
 
+PoseSequence Rendering::read_motion(const Model& model, const std::string& path) {
+    const FrameSource<Pose> source = poses_of(options_.motion, {}, model, {}, path, session_);
+    PoseSequence poses{source.frames_per_second, {}};
+    for (std::size_t frame = 0; frame < source.frames; ++frame) poses.frames.push_back(require(source.frame(frame)));
+    return poses;
+}
+
 bool Rendering::is_level_at_rest(const FileReader& file, const std::string& path) const {
-    return options_.restore.level && options_.poses.empty() && options_.frame == 0 && options_.scalar != "level" &&
-           options_.as == DrawnAs::polygons && is_model_file(file) && session_.outline(file, path).frames == 0;
+    return options_.restore.level && options_.poses.empty() && options_.motion.empty() && options_.frame == 0 &&
+           options_.scalar != "level" && options_.as == DrawnAs::polygons && is_model_file(file) &&
+           session_.outline(file, path).frames == 0;
 }
 
 void Rendering::finish(Subject& subject, const std::string& path) {

@@ -29,6 +29,7 @@ enum class DrawnAs { polygons, surfels };
 struct RenderOptions {
     std::vector<std::string> files, poses, captions;
     std::string output;
+    std::string motion; ///< an animation of the driver, in the place of the model's own poses
     PictureSize size;
     View view = View::iso;
     std::optional<UpAxis> up;
@@ -45,7 +46,7 @@ struct RenderOptions {
     std::vector<double> range;
     ColorMap map = ColorMap::sequential;
     unsigned passes = 0;
-    bool turntable = false;
+    bool turntable = false, draft = false;
     std::string chunk; ///< K/N: of numbered pictures; empty: all
     unsigned frames = 90;
     std::size_t frame = 0;                   ///< of the model's own poses, from 1; 0: all in a film, else none
@@ -90,6 +91,8 @@ protected:
     void choose_surfels(Subject& subject, const std::string& path);
     void upload(Subject& subject);
     void upload_surfels(Subject& subject);
+    /// The frames of options.motion.
+    PoseSequence read_motion(const Model& model, const std::string& path);
     Pose read_pose(const Subject& subject, const std::string& path) const {
         return pose_of_mesh(session_.read_mesh(path), subject.model->mesh.origin);
     }

@@ -72,6 +72,9 @@ struct RestoreArguments {
     bool is_animation() const { return all_frames || !poses.empty(); }
 };
 
+/// A model takes the poses in; nothing has to be restored for that.
+bool is_model_name(const std::string& path) { return lower_extension(path_of(path)) == ".fil"; }
+
 /// A name without an ending is a folder to come.
 std::string animation_place(const std::string& output) {
     const bool is_plain = !path_of(output).has_extension() && !is_animation_path(output) && output != "-";
@@ -102,6 +105,15 @@ void check(const RestoreArguments& options, const Session& session) {
     const std::string given = given_animation_option(session);
     if (!options.is_animation() && !given.empty()) refuse(given + " belongs to --poses or --frames.");
     if (!options.is_animation()) return;
+    if (is_model_name(options.output)) {
+        if (!given.empty() || options.restore.level || !options.chunk.empty())
+            refuse(options.output + ": a model keeps its poses, with all levels; leave out " +
+                   (!given.empty()          ? given
+                    : options.restore.level ? "--level"
+                                            : "--chunk") +
+                   ".");
+        return check_folder_of(options.output);
+    }
     const std::string place = animation_place(options.output);
     if (!is_animation_path(place) && mesh_format(path_of(place)))
         refuse(place + ": is the name of one mesh, and there are many; put #### where their numbers go, or give -o a "
@@ -293,8 +305,26 @@ void restore_chunk(const FileReader& file, const RestoreArguments& options, Sess
     session.print(report);
 }
 
+/// The model with the poses, for programs that read models.
+void keep_poses(const FileReader& file, const RestoreArguments& options, Session& session) {
+    PoseSequence own;
+    const Model model = session.read_model(file, options.model, options.all_frames ? &own : nullptr);
+    const FrameSource<Pose> source = poses_of(options.poses, options.poses_file, model, own, options.model, session);
+    PoseSequence poses{source.frames_per_second, {}};
+    for (std::size_t frame = 0; frame < source.frames; ++frame) poses.frames.push_back(require(source.frame(frame)));
+    session.write_model(model, options.output, poses);
+    Report report;
+    report.say(fmt::format("{}: the model with {} poses at {:.6g} a second\n", options.output,
+                           with_commas(poses.frames.size()), poses.frames_per_second));
+    report.set("output", options.output);
+    report.set("frames", poses.frames.size());
+    report.set("frames_per_second", poses.frames_per_second);
+    session.print(report);
+}
+
 void restore_all(const FileReader& file, const RestoreArguments& options, Session& session) {
     if (!options.chunk.empty()) return restore_chunk(file, options, session);
+    if (is_model_name(options.output)) return keep_poses(file, options, session);
     AnimatedModel model;
     read_animated(file, options, session, model);
     const char* from = source_of(require(model.poses.frame(0)));

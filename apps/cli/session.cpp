@@ -88,12 +88,47 @@ private:
     bool drawn_ = false;
 };
 
+/// The same where nobody can draw over a line, such as in a log: a line with an estimate after some seconds, then one a
+/// tenth of the work, and not too many of them.
+class ProgressLines {
+public:
+    void tell(std::string_view phase, double fraction) {
+        constexpr double kFirst = 10, kNext = 10, kSilence = 300; // seconds
+        const double now = now_seconds();
+        if (phase != phase_) {
+            phase_ = phase;
+            phase_start_ = last_ = now;
+            told_ = -1;
+        }
+        const double gone = now - phase_start_;
+        if (told_ < 0 ? gone < kFirst || fraction < 0.005
+                      : now - last_ < kNext || (fraction < told_ + 0.1 && now - last_ < kSilence))
+            return;
+        if (fraction >= 1) return;
+        write_text(fmt::format("filigree: {}: {:.0f} % in {}, about {} left\n", phase, 100 * fraction, span(gone),
+                               span(gone / fraction * (1 - fraction))));
+        told_ = fraction;
+        last_ = now;
+    }
+
+private:
+    static std::string span(double seconds) {
+        const auto whole = static_cast<long>(seconds + 0.5);
+        if (whole < 60) return fmt::format("{} s", whole);
+        if (whole < 3600) return fmt::format("{}:{:02} min", whole / 60, whole % 60);
+        return fmt::format("{}:{:02} h", whole / 3600, whole / 60 % 60);
+    }
+
+    std::string phase_;
+    double phase_start_ = 0, last_ = 0, told_ = -1;
+};
+
 } // namespace
 
 OptionList Session::common_options() {
     return {Option("--json", json, "Print the result as JSON"),
             Option("--threads", threads, "Number of threads; 0: all. Results do not depend on it").between(0, 1024),
-            Option("--quiet", quiet, "No progress bar, no warnings, no summary of written files")};
+            Option("--quiet", quiet, "No progress, no warnings, no summary of written files")};
 }
 
 std::string Session::first_given(const std::vector<std::string>& options) const {
@@ -115,7 +150,11 @@ std::string Session::settings_but(const std::vector<std::string>& options) const
 
 void Session::begin() {
     context_.emplace(threads);
-    if (!quiet && platform::is_terminal(platform::kStandardError))
+    if (!quiet && !platform::is_terminal(platform::kStandardError))
+        context_->progress = [lines = std::make_shared<ProgressLines>()](std::string_view phase, double fraction) {
+            lines->tell(phase, fraction);
+        };
+    else if (!quiet)
         context_->progress = [bar = std::make_shared<ProgressBar>()](std::string_view phase, double fraction) {
             bar->draw(phase, fraction);
             if (fraction >= 1) bar->clear();

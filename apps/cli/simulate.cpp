@@ -1,6 +1,7 @@
 #include "simulate.h"
 #include "animation_output.h"
 #include "commands.h"
+#include "draft.h"
 #include "drawing.h"
 #include "simulate_report.h"
 
@@ -150,6 +151,13 @@ public:
                                               ": --finer cannot judge bodies that break, as finer ones would "
                                               "break elsewhere; take [[fracture]] out of the scene.");
         if (options.frames) scene_.frames = options.frames;
+        if (options.draft) {
+            if (outputs_.films.empty()) refuse("--draft is of films; let -o end in .mp4, .gif or _%04d.png.");
+            ScenePicture& picture = scene_.picture;
+            picture.size = draft_size(picture.size);
+            picture.passes = std::min(picture.passes, kDraftPasses);
+            picture.most_triangles = std::min(picture.most_triangles, kDraftTriangles);
+        }
         if (!outputs_.films.empty()) films_.emplace(outputs_.films, scene_);
         ready_ = require(set_up(scene_, session.context()));
         session.warn(ready_.warnings);
@@ -344,6 +352,11 @@ void Run::report() const {
     report.set("doubt", doubt ? Json(*doubt) : Json());
     if (!options_.outputs.empty())
         report.row("written", fmt::format("{} in {}", fmt::join(options_.outputs, ", "), seconds_text(write_seconds_)));
+    const ScenePicture& picture = scene_.picture;
+    if (options_.draft)
+        report.row("draft", fmt::format("{} x {} pixels, {} passes; leave out --draft for the film itself",
+                                        picture.size[0], picture.size[1], picture.passes));
+    if (films_) report.set("draft", options_.draft);
     if (!options_.save.empty()) report.row("state", options_.save);
     report.set("write_seconds", write_seconds_);
     report.set("film_seconds", film_seconds_);
@@ -397,6 +410,7 @@ Command simulate_command() {
                 Option("--surfels", options->as_surfels,
                        "Write surfels of mpm bodies into folders, not meshes: points with a normal and two half axes"),
                 Option("--frames", options->frames, "Number of frames (default: that of the scene)").whole_from(1),
+                Option("--draft", options->draft, kDraftHelp),
                 Option("--check", options->check,
                        "Also move every vertex by the particles, and report how far the restored mesh is from that"),
                 Option("--finer", options->finer,
@@ -407,6 +421,7 @@ Command simulate_command() {
             animation_options(options->animation) +
             OptionList{Option("--keys", options->keys, "Print every key that a scene can have, and the materials")},
         .examples = "  filigree simulate bounce.toml -o bounce.mp4 -o bounce.fil\n"
+                    "  filigree simulate bounce.toml -o look.mp4 --draft\n"
                     "  filigree simulate bounce.toml -o bounce.glb -o bounce.pc2\n"
                     "  filigree simulate bounce.toml -o meshes/ --frames 60 --check\n"
                     "  filigree simulate long.toml --save state --stop-at 100\n"

@@ -17,7 +17,7 @@ struct SimulateArguments {
     std::string save, resume;
     std::vector<std::string> outputs;
     std::size_t frames = 0, stop_at = 0; ///< 0: as the scene says; not before the end
-    bool check = false, finer = false, keys = false, as_surfels = false;
+    bool check = false, finer = false, keys = false, as_surfels = false, draft = false;
     AnimationOutput animation;
 };
 

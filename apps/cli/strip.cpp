@@ -35,7 +35,7 @@ void refuse_mesh_name(const std::string& path) {
 }
 
 /// Counts of what did not go as hoped: a row where there is any.
-void report_doubts(const StripReport& strip, Report& report) {
+void report_doubts(const StripReport& strip, std::size_t vertices, Report& report) {
     const auto add = [&](const char* title, const char* key, std::size_t count, const char* note) {
         if (count > 0) report.row(title, with_commas(count) + note);
         report.set(key, count);
@@ -43,7 +43,13 @@ void report_doubts(const StripReport& strip, Report& report) {
     add("vertices at one place", "welded_vertices", strip.welded_vertices, "");
     add("forced collapses", "forced_collapses", strip.forced_collapses, " (small components and tunnels removed)");
     add("bound across gaps", "across_gap", strip.across_gap, " (vertices of parts that have no driver vertex)");
-    add("bound facing away", "facing_away", strip.facing_away, "");
+    // Few of them do no harm that can be seen.
+    if (strip.facing_away * 100 > vertices)
+        report.row("bound poorly",
+                   fmt::format("{} vertices ({:.2g} %), in folds that the driver is too coarse for; a "
+                               "larger --base leaves fewer",
+                               with_commas(strip.facing_away), 100 * double(strip.facing_away) / double(vertices)));
+    report.set("facing_away", strip.facing_away);
 }
 
 Report make_report(const Stripped& stripped, const std::string& output, const StripSeconds& seconds) {
@@ -61,7 +67,7 @@ Report make_report(const Stripped& stripped, const std::string& output, const St
     report.set("driver_vertices", driver.vertices.size());
     report.set("driver_faces", driver.face_count());
     report.add("levels", fmt::format("{} + the finest", model.levels.size()), "levels", levels);
-    report_doubts(strip, report);
+    report_doubts(strip, model.vertex_count(), report);
     report.set("simplify_error", strip.simplify_error);
     report.set("simplify_error_units", strip.simplify_error * world_bounds(model.mesh).diagonal());
     report.add("seconds",

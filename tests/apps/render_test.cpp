@@ -338,6 +338,17 @@ TEST_F(Render, FilmsAreNumberedPictures) {
              {"--poses", "driver.ply", "bent.ply", "--scalar", "level", "--size", "300x200"}));
     EXPECT_EQ(picture("level_2.png").width, 300u);
 
+    // The motion of the driver as one file, a moment of it, and a draft.
+    ok({"deform", "cube.fil", "-o", "bending.fil", "--bend", "90", "--frames", "2"});
+    ok({"restore", "cube.fil", "--poses", "bending.fil", "-o", "moved.fil"});
+    EXPECT_EQ(json(quick("cube.fil", "motion_%d.png", {"--poses", "moved.fil"}))["frames"], 2);
+    EXPECT_TRUE(shows_something(drawn("cube.fil", {"--poses", "moved.fil", "--frame", "2"}), drawn("cube.fil")));
+    refused(2, quick("cube.fil", "x.png", {"--poses", "moved.fil"}), {"moved.fil", "--frame"});
+    const Json draft = json({"render", "moved.fil", "-o", "draft_%d.png", "--draft"});
+    EXPECT_EQ(draft["width"], 480);
+    EXPECT_EQ(draft["height"], 360);
+    refused(2, quick("cube.fil", "x.png", {"--draft"}), {"--draft", "films"});
+
     std::vector<std::string> files_film = quick("cube.ply", "file_%d.png");
     files_film.insert(files_film.begin() + 2, "square.ply");
     EXPECT_EQ(json(files_film)["frames"], 2);

@@ -215,6 +215,33 @@ TEST_F(Rendered, SameBytesFromRunToRunWhateverTheThreadsAndWhatWasDrawnBefore) {
     EXPECT_EQ(picture->rgba, first.rgba);
 }
 
+/// A pixel is lit when all is drawn, or as it is drawn where there are lines: lines without width make no difference.
+TEST_F(Rendered, LightIsTheSameAtOnceAndLater) {
+    const Mesh mesh = wavy_cube();
+    const Drawable cube = surface(mesh);
+    const Camera camera = camera_on(mesh);
+    for (const Vec3f& color : {Vec3f(0.8f, 0.3f, 0.1f), Vec3f(0.05f, 0.05f, 0.9f)}) {
+        Appearance later{.color = color, .gloss = 0.6f}, at_once = later;
+        at_once.edges = true;
+        at_once.edge_width = -1;
+        const double off = picture_distance(draw(scene_of(cube, later), camera), draw(scene_of(cube, at_once), camera));
+        EXPECT_LT(off, 0.6);
+    }
+}
+
+/// From inside a solid, its back faces are all there is to see.
+TEST_F(Rendered, ASolidIsSeenFromInsideToo) {
+    const Mesh mesh = wavy_cube();
+    const Drawable cube = surface(mesh);
+    Camera camera = camera_on(mesh);
+    camera.eye = world_bounds(mesh).centre();
+    camera.target = camera.eye + Vec3d(1, 0.2, 0.1);
+    Scene scene = scene_of(cube);
+    scene.background.transparent = true;
+    const Picture inside = draw(scene, camera);
+    for (std::size_t i = 3; i < inside.rgba.size(); i += 4) ASSERT_EQ(inside.rgba[i], 255);
+}
+
 TEST_F(Rendered, AModelIsRestoredInTheShaderAsOnTheProcessor) {
     Mesh mesh = wavy_cube();
     mesh.normals.values = vertex_normals(mesh, mesh.positions, kOneThread); // which both carry along with the gradients
@@ -223,7 +250,8 @@ TEST_F(Rendered, AModelIsRestoredInTheShaderAsOnTheProcessor) {
         const Pose pose = pose_by(bend(80), model);
         for (const std::optional<unsigned> level : {std::optional<unsigned>(), std::optional<unsigned>(0)}) {
             const RestoreOptions restore{.level = level};
-            Drawable posed = drawable_of(Drawable::model(model, restore, {}, kOneThread));
+            Drawable posed =
+                drawable_of(Drawable::upload(*DrawData::model(model, restore, {}, RestoreOn::gpu, kOneThread)));
             EXPECT_TRUE(posed.set_pose(pose, kOneThread).ok());
             const Mesh rest = level_mesh(model, level.value_or(model.finest_level()));
             Result<Mesh> moved = restorer_of(model, restore).mesh(pose, kOneThread);

@@ -313,7 +313,7 @@ Result<std::vector<std::string>> film_scene(const SceneFile& scene, const ReadyS
         SceneFilm film(scene, ready, recording, context);
         const Status filmed = film_frames(
             film.frames(), [&](std::size_t frame, const RunContext&) { return film.frame(frame, renderer); }, writers,
-            "filming", context);
+            "filming " + std::to_string(film.frames()) + " frames", context);
         if (!filmed) return filmed.error();
         return std::move(film.warnings);
     } catch (const BadResultAccess& failure) {

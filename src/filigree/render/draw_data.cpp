@@ -4,9 +4,12 @@
 #include "filigree/mesh/vertex_cache.h"
 #include "filigree/render/drawable_content.h"
 #include "filigree/render/octahedron.h"
+#include "filigree/render/solid.h"
 
 #include <algorithm>
 #include <cmath>
+
+#include <meshoptimizer.h>
 
 namespace filigree {
 
@@ -92,6 +95,11 @@ void fill(DrawData::Content& content, const Mesh& mesh, const SurfaceOptions& op
         for (const DrawArrays::Part& part : draw.parts)
             order_for_vertex_cache(std::span(content.triangles).subspan(part.first, part.count), count);
     content.mesh_vertex_count = mesh.vertex_count();
+    content.is_solid =
+        is_solid(mesh.positions, values_of<Triangle>(content.triangles.size(), context, [&](std::size_t t) {
+                     const Triangle& drawn = content.triangles[t];
+                     return Triangle{vertex[drawn[0]], vertex[drawn[1]], vertex[drawn[2]]};
+                 }));
     content.origin = mesh.origin;
     content.box = moved_to(bounds(mesh), mesh.origin);
     for (const DrawArrays::Part& drawn : draw.parts) {
@@ -106,6 +114,32 @@ void fill(DrawData::Content& content, const Mesh& mesh, const SurfaceOptions& op
         }
         content.parts.push_back(std::move(part));
     }
+}
+
+/// The triangles for shadow maps of a model, which is drawn again and again: as many as its shape asks for. Half a
+/// texel of a map is the error: less than the bias that keeps a surface out of its own shadow.
+std::vector<Triangle> triangles_for_shadows(const Mesh& mesh, std::span<const Triangle> triangles,
+                                            std::span<const Index> vertex) {
+    constexpr std::size_t kFew = 20'000, kLargestFan = 4096; // triangles at a vertex; more take quadratic time
+    constexpr float kError = 1.2e-4f;                        // of the longest side
+    if (triangles.size() < kFew) return {};
+    std::vector<Index> first(mesh.vertex_count(), kNoIndex), fan(mesh.vertex_count(), 0);
+    for (Index d = 0; d < vertex.size(); ++d)
+        if (first[vertex[d]] == kNoIndex) first[vertex[d]] = d;
+    std::vector<Triangle> from(triangles.begin(), triangles.end()), fewer(triangles.size());
+    for (Triangle& t : from)
+        for (Index& v : t) {
+            v = vertex[v]; // of the mesh: seams of normals and of pictures are none for shadows
+            if (++fan[v] > kLargestFan) return {};
+        }
+    const std::size_t corners =
+        meshopt_simplify(fewer.front().data(), from.front().data(), 3 * from.size(), mesh.positions.front().data(),
+                         mesh.positions.size(), sizeof(Vec3f), 3 * kFew / 4, kError, 0, nullptr);
+    fewer.resize(corners / 3);
+    if (2 * fewer.size() > triangles.size()) return {};
+    for (Triangle& t : fewer)
+        for (Index& v : t) v = first[v];
+    return fewer;
 }
 
 Result<DrawArrays> arrays_of(const Mesh& mesh, const SurfaceOptions& options, const RunContext& context) {
@@ -128,6 +162,10 @@ std::vector<ColorBytes> color_bytes(std::span<const Vec4f> colors, std::span<con
     return values_of<ColorBytes>(vertex.size(), context, [&](std::size_t d) { return to_bytes(colors[vertex[d]]); });
 }
 
+bool turns_out(std::span<const Mat3f> gradients) {
+    return !std::ranges::all_of(gradients, [](const Mat3f& a) { return a.determinant() > 0; });
+}
+
 Status move_vertices(ModelMotion& motion, const Pose& pose, std::size_t count, const RunContext& context) {
     if (Status status = check_pose(*motion.model, pose); !status) return status.error();
     if (context.is_cancelled()) return cancelled_error();
@@ -135,6 +173,7 @@ Status move_vertices(ModelMotion& motion, const Pose& pose, std::size_t count, c
     motion.normals.resize(count);
     const Result<std::vector<Mat3f>> gradients = motion.restorer->gradients(pose, context);
     if (!gradients) return gradients.error();
+    motion.turns_out = turns_out(*gradients);
     motion.on_cpu->restore(pose.positions, *gradients, motion.positions, motion.normals, false, context);
     return Success{};
 }
@@ -205,6 +244,7 @@ Result<DrawData> DrawData::model(const Model& model, const RestoreOptions& resto
     }
     if (context.is_cancelled()) return cancelled_error();
     fill(*content, rest, options, *draw, drawn_at, context);
+    content->shadow_triangles = triangles_for_shadows(rest, content->triangles, content->vertex);
     return DrawData(std::move(content));
 }
 

@@ -161,6 +161,12 @@ Status Drawable::Content::upload_arrays(const DrawData::Content& data) {
     if (!indices) return indices.error();
     triangles = std::move(indices).value();
     triangle_count = data.triangles.size();
+    shadow_triangle_count = data.shadow_triangles.size();
+    if (shadow_triangle_count > 0) {
+        Result<Buffer> fewer = gl::make_buffer(std::span(data.shadow_triangles));
+        if (!fewer) return fewer.error();
+        shadow_triangles = std::move(fewer).value();
+    }
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, triangles.name());
 
     Result<Buffer> flags = gl::make_buffer(std::span(data.edges));
@@ -227,6 +233,7 @@ Result<Drawable> Drawable::upload(DrawData draw_data) {
     content->box = data.box;
     content->vertex = std::move(data.vertex);
     content->mesh_vertex_count = data.mesh_vertex_count;
+    content->is_solid = data.is_solid;
     content->motion = std::move(data.motion);
     if (std::optional<GpuRestorer>& on_gpu = content->motion.on_gpu) {
         if (Status s = on_gpu->upload(); !s) return s.error();
@@ -244,7 +251,9 @@ Result<Drawable> Drawable::surface(const Mesh& mesh, const SurfaceOptions& optio
 
 Result<Drawable> Drawable::model(const Model& model, const RestoreOptions& restore, const SurfaceOptions& options,
                                  const RunContext& context) {
-    Result<DrawData> data = DrawData::model(model, restore, options, RestoreOn::gpu, context);
+    // A software renderer's vertex shaders would restore in every pass, and for every shadow map.
+    const RestoreOn where = gl::is_software_renderer() ? RestoreOn::cpu : RestoreOn::gpu;
+    Result<DrawData> data = DrawData::model(model, restore, options, where, context);
     if (!data) return data.error();
     return upload(std::move(*data));
 }
@@ -291,9 +300,11 @@ Status Drawable::set_pose(const Pose& pose, const RunContext& context) {
         const Result<std::vector<Mat3f>> gradients = motion.restorer->gradients(pose, context);
         if (!gradients) return gradients.error();
         box = motion.pose_box->at(pose.positions, *gradients);
+        content.is_turned_out = turns_out(*gradients);
     } else {
         const std::size_t count = content.vertex.size();
         if (Status s = move_vertices(motion, pose, count, context); !s) return s;
+        content.is_turned_out = motion.turns_out;
         const Mapped<Vec3f> positions(content.positions, count);
         const Mapped<std::uint32_t> normals(content.normals, count);
         if (positions.values.empty() || normals.values.empty()) return no_memory();

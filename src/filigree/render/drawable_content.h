@@ -28,7 +28,11 @@ struct ModelMotion {
     // Restored by the processor, in the order of drawing.
     std::optional<BlendRestorer> on_cpu;
     std::vector<Vec3f> positions, normals; ///< kept from pose to pose, as making arrays takes time
+    bool turns_out = false;                ///< as turns_out said of the gradients
 };
+
+/// Whether a pose with these gradients turns the inside out somewhere.
+bool turns_out(std::span<const Mat3f> gradients);
 
 /// Scalars of the mesh's vertices as draw vertices have them: the place in their range, and far below for none.
 std::vector<float> scalar_places(const ScalarColors& scalars, std::span<const Index> vertex, const RunContext& context);
@@ -60,10 +64,12 @@ struct DrawData::Content {
     std::vector<Index> vertex; ///< of the mesh or level
 
     std::vector<Triangle> triangles;
+    std::vector<Triangle> shadow_triangles; ///< fewer, for shadow maps; empty: the same
     std::vector<std::uint8_t> edges;
     std::vector<Part> parts;
     ColorMap map = ColorMap::sequential;
     std::size_t mesh_vertex_count = 0;
+    bool is_solid = false; ///< solid.h
     Vec3d origin = Vec3d::Zero();
     Box box;
     ModelMotion motion;
@@ -78,15 +84,17 @@ struct Drawable::Content {
     };
 
     gl::VertexArray arrays;
-    gl::Buffer positions, normals, uvs, colors, scalars, triangles, edge_flags;
+    gl::Buffer positions, normals, uvs, colors, scalars, triangles, shadow_triangles, edge_flags;
     gl::Texture edge_texture, scalar_colors;
     std::vector<Part> parts;
     bool has_colors = false, has_scalars = false, has_uvs = false;
 
     Vec3d origin = Vec3d::Zero();
     Box box;
-    std::size_t triangle_count = 0;
-    std::vector<Index> vertex; ///< of the mesh or level, of each draw vertex
+    std::size_t triangle_count = 0, shadow_triangle_count = 0;
+    bool is_solid = false;      ///< at rest
+    bool is_turned_out = false; ///< by the present pose: somewhere its inside may be outside
+    std::vector<Index> vertex;  ///< of the mesh or level, of each draw vertex
     std::size_t mesh_vertex_count = 0;
     ModelMotion motion;
 

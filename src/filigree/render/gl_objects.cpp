@@ -60,4 +60,11 @@ Result<Buffer> make_buffer(const void* data, std::size_t bytes) {
     return buffer;
 }
 
+bool is_software_renderer() {
+    const auto* text = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+    const std::string name = text ? text : "";
+    return name.find("llvmpipe") != std::string::npos || name.find("softpipe") != std::string::npos ||
+           name.find("SWR") != std::string::npos || name.find("Software") != std::string::npos;
+}
+
 } // namespace filigree::gl

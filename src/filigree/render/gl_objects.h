@@ -86,6 +86,9 @@ private:
     Object<ProgramTraits> object_;
 };
 
+/// Whether the processor draws: several samples a pixel are several times the work then, and so is every vertex.
+bool is_software_renderer();
+
 /// A buffer filled with `values` (once; GL_STATIC_DRAW), or out_of_memory where the GPU does not take that many bytes.
 Result<Buffer> make_buffer(const void* data, std::size_t bytes);
 template <class T>

@@ -4,7 +4,7 @@ namespace filigree::gl {
 
 namespace {
 
-constexpr GLuint kUnits = 5; // of textures, that the shaders read
+constexpr GLuint kUnits = 6; // of textures, that the shaders read
 
 /// Everything that drawing depends on and that others who draw in this context (Qt's painter) may have left otherwise.
 void set_state() {

@@ -73,6 +73,17 @@ bool Targets::make(unsigned w, unsigned h, int samples_a_pixel) {
     pass = make_framebuffer(&color, &depth);
     total = make_framebuffer(&sum, nullptr);
     bool complete = is_complete();
+    seen = samples_a_pixel > 1 ? Texture() : make_texture(GL_RGBA32UI, x, y);
+    seeing = samples_a_pixel > 1 ? Framebuffer() : make_framebuffer(&seen, &depth);
+    complete = complete && (samples_a_pixel > 1 || is_complete());
+    adding = samples_a_pixel > 1 ? Framebuffer() : make_framebuffer(&sum, &depth);
+    ground = make_texture(GL_R16F, (x + 1) / 2, (y + 1) / 2);
+    for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+        glTexParameteri(GL_TEXTURE_2D, filter, GL_LINEAR);
+    for (const GLenum side : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
+        glTexParameteri(GL_TEXTURE_2D, side, GL_CLAMP_TO_EDGE);
+    ground_only = make_framebuffer(&ground, nullptr);
+    complete = complete && is_complete();
     multisampled =
         samples_a_pixel > 1 ? Multisampled(samples_a_pixel, GL_RGBA16F, GL_DEPTH_COMPONENT32F, x, y) : Multisampled();
     complete = complete && (samples_a_pixel <= 1 || is_complete());

@@ -35,7 +35,10 @@ struct Multisampled {
 /// Where passes are drawn and added up.
 struct Targets {
     Texture color, depth, sum;
-    Framebuffer pass, total;
+    Texture seen;   ///< shaders/seen.glsl; none with several samples a pixel
+    Texture ground; ///< the share of its light that does not reach it, at half the size
+    Framebuffer pass, total, seeing, ground_only;
+    Framebuffer adding; ///< the total, with the pass's depth
     Multisampled multisampled;
     unsigned width = 0, height = 0;
     int samples = 0;

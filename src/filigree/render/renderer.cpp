@@ -29,14 +29,6 @@ void put(float (&to)[4], const Vec3d& v, double w) {
     to[3] = static_cast<float>(w);
 }
 
-/// Whether the processor draws, for which several samples a pixel are several times the work.
-bool is_software_renderer() {
-    const auto* text = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
-    const std::string name = text ? text : "";
-    return name.find("llvmpipe") != std::string::npos || name.find("softpipe") != std::string::npos ||
-           name.find("SWR") != std::string::npos || name.find("Software") != std::string::npos;
-}
-
 unsigned passes_for(const Scene& scene) {
     double triangles = 0;
     for (const SceneObject& object : scene.objects)
@@ -81,7 +73,9 @@ Result<Renderer> Renderer::create() {
         link(frame + shaders::points_vertex, points + shaders::preview_lighting + shaders::points_fragment);
     content->copy = link(shaders::cover_vertex, shaders::copy_fragment);
     content->preview_background = link(shaders::cover_vertex, shaders::preview_background);
+    content->lit = link(shaders::cover_vertex, frame + lighting + shaders::seen + shaders::lit_fragment);
     content->ground = link(frame + shaders::ground_vertex, frame + shaders::ground_fragment);
+    content->ground_cover = link(shaders::cover_vertex, frame + shaders::ground_cover_fragment);
     content->add = link(shaders::cover_vertex, shaders::add_fragment);
     content->show = link(shaders::cover_vertex, shaders::show_fragment);
     content->nothing = gl::VertexArray::make();
@@ -94,7 +88,7 @@ Result<Renderer> Renderer::create() {
     glGetIntegerv(GL_MAX_TEXTURE_SIZE, &content->largest);
     content->largest = std::min({content->largest, viewport[0], viewport[1]});
     glGetIntegerv(GL_MAX_SAMPLES, &content->most_samples);
-    content->is_software = is_software_renderer();
+    content->is_software = gl::is_software_renderer();
     return Renderer(std::move(content));
 }
 
@@ -223,6 +217,17 @@ FrameBlock Renderer::Content::view_of(const Eigen::Vector2d& shift) const {
     shifted(1, 3) = 2 * shift.y() / height;
     projection = shifted * projection;
     put(block.view_projection, projection * view);
+    const Mat4d to_scene = (projection * view).inverse();
+    const auto at = [&](double x, double y, double z) {
+        return (to_scene * Eigen::Vector4d(x, y, z, 1)).hnormalized().eval();
+    };
+    for (const auto& [rays, z] : {std::pair(block.near, -1.0), std::pair(block.far, 1.0)}) {
+        const Vec3d middle = at(0, 0, z);
+        put(rays[0], middle, 0);
+        put(rays[1], at(1, 0, z) - middle, 0);
+        put(rays[2], at(0, 1, z) - middle, 0);
+    }
+    put(block.along, -back / (furthest - nearest), (back.dot(from) - nearest) / (furthest - nearest));
     if (camera.field_of_view_deg > 0)
         put(block.eye, eye, 1);
     else
@@ -302,21 +307,44 @@ bool Renderer::add_pass() {
     c.draw_depth(block, LightView(c.lights->sky(c.done), c.box, c.sky_map->size), *c.sky_map);
 
     const gl::Targets& targets = c.targets;
-    const Framebuffer& target = targets.samples > 1 ? targets.multisampled.framebuffer : targets.pass;
+    const bool lights_later = targets.samples <= 1;
+    // Where each pixel is lit once, its light goes straight to the sum of the passes.
+    const bool adds = lights_later && std::ranges::all_of(c.scene.objects, [&](const SceneObject& object) {
+                          return c.is_lit_later(object) || object.appearance.coverage == 0;
+                      });
+    const Framebuffer& target = adds ? targets.adding : lights_later ? targets.pass : targets.multisampled.framebuffer;
     const auto w = static_cast<GLsizei>(c.width), h = static_cast<GLsizei>(c.height);
     glBindFramebuffer(GL_FRAMEBUFFER, target.name());
     glViewport(0, 0, w, h);
     const std::array<float, 4> zero = {};
-    glClearBufferfv(GL_COLOR, 0, zero.data());
+    if (!adds) glClearBufferfv(GL_COLOR, 0, zero.data());
     glClear(GL_DEPTH_BUFFER_BIT);
     c.use(block);
     glActiveTexture(GL_TEXTURE0);
     glBindTexture(GL_TEXTURE_2D, c.key_map->depth.name());
     glActiveTexture(GL_TEXTURE1);
     glBindTexture(GL_TEXTURE_2D, c.sky_map->depth.name());
+    if (lights_later) {
+        glBindFramebuffer(GL_FRAMEBUFFER, targets.seeing.name());
+        c.draw_objects(Content::Target::seen);
+        glBindFramebuffer(GL_FRAMEBUFFER, target.name());
+        glBlendFunc(GL_ONE, GL_ONE);
+        if (adds) glEnable(GL_BLEND);
+        c.light_seen();
+        glDisable(GL_BLEND);
+    }
     c.draw_objects(Content::Target::light);
-    if (c.shows_ground) c.draw_ground();
+    if (c.shows_ground) {
+        c.draw_ground();
+        glBindFramebuffer(GL_FRAMEBUFFER, target.name());
+        glViewport(0, 0, w, h);
+        if (adds) glEnable(GL_BLEND);
+        c.cover_ground();
+        glDisable(GL_BLEND);
+    }
 
+    ++c.done;
+    if (adds) return true;
     if (targets.samples > 1) targets.multisampled.resolve_to(targets.pass, w, h);
     glBindFramebuffer(GL_FRAMEBUFFER, targets.total.name());
     glDisable(GL_DEPTH_TEST);
@@ -327,7 +355,6 @@ bool Renderer::add_pass() {
     glBindTexture(GL_TEXTURE_2D, targets.color.name());
     glBindVertexArray(c.nothing.name());
     glDrawArrays(GL_TRIANGLES, 0, 3);
-    ++c.done;
     return true;
 }
 

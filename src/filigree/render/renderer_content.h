@@ -18,11 +18,13 @@ inline constexpr const char* kGlslVersion = "#version 430 core\n";
 struct FrameBlock {
     float view_projection[16], key_matrix[16], sky_matrix[16];
     float eye[4], key_direction[4], sky_direction[4], fill_direction[4], up[4], viewport[4], strength[4], ground[4];
+    float near[3][4], far[3][4], along[4];
 };
 
 struct Renderer::Content {
     enum class Source { given, float_records, int16_records };
-    enum class Target { light, preview, depth };
+    /// seen: what lies at each pixel, to be lit later; light: lit as it is drawn.
+    enum class Target { seen, light, preview, depth };
     /// What a surface's program is made for: nothing is computed that is not needed.
     struct Kind {
         Target target = Target::light;
@@ -35,7 +37,7 @@ struct Renderer::Content {
 
     // Made once.
     std::map<Kind, gl::Program> surface_programs;
-    gl::Program points, points_in_preview, ground, add, show, copy, preview_background;
+    gl::Program points, points_in_preview, lit, ground, ground_cover, add, show, copy, preview_background;
     gl::Buffer frame_buffer;
     gl::VertexArray nothing; ///< for shaders that need no input
     std::optional<gl::ShadowMap> key_map, sky_map;
@@ -70,7 +72,12 @@ struct Renderer::Content {
 
     // renderer_objects.cpp
     void draw_objects(Target target);
+    void light_seen();
     void draw_ground();
+    void cover_ground();
+    /// Whether a pass keeps what it sees of the object, and lights it later.
+    bool is_lit_later(const SceneObject& object) const;
+    bool hides_back_faces(const SceneObject& object) const;
     static std::string vertex_source(const Kind& kind);
     static Source source_of(const Drawable::Content& drawable);
     const gl::Program& surface_program(const Kind& kind);

@@ -11,10 +11,23 @@ layout(std140, binding = 0) uniform Frame {
     vec4 viewport;               // width, height in pixels; z: number of the pass; w: 1 in a shadow pass
     vec4 strength;               // of the light: key, sky, fill, bounce from the ground
     vec4 ground;                 // shares of this pass's light on the ground: key, sky; z: how dark shadow may be; w: 1 / sqrt(passes)
+    vec4 near[3], far[3];        // where the ray through a place of [-1, 1]^2 begins and ends: middle, for x, for y
+    vec4 along;                  // dot(along.xyz, p) + along.w: the part of that ray at which p is
 } frame;
 
 vec3 to_viewer(vec3 position) {
     return frame.eye.w > 0.5 ? normalize(frame.eye.xyz - position) : frame.eye.xyz;
+}
+
+/// Both normals of what is seen, of unit length and on the viewer's side; where there is none, another stands for it.
+void turn_to_viewer(vec3 position, inout vec3 facing, inout vec3 normal) {
+    vec3 view = to_viewer(position);
+    float size = length(facing);
+    facing = size > 0.0 ? facing / size : view;
+    if (dot(facing, view) < 0.0) facing = -facing;
+    float normal_size = length(normal);
+    normal = normal_size > 1e-3 ? normal / normal_size : facing;
+    if (dot(normal, facing) < 0.0) normal = -normal;
 }
 
 // What a surface's vertices hand on, from stage to stage.

@@ -2,7 +2,7 @@
 // each light, so the shadow is blurred as far as the directions of its neighbours would carry it: further below what is
 // high in the air [Fernando 2005].
 in vec3 position;
-layout(location = 0) out vec4 result;
+layout(location = 0) out float result;
 layout(binding = 0) uniform sampler2D key_depth;
 layout(binding = 1) uniform sampler2D sky_depth;
 
@@ -45,5 +45,5 @@ void main() {
     vec2 turn = vec2(cos(angle), sin(angle));
     float dark = frame.ground.x * (1.0 - open_share(key_depth, frame.key_matrix, kKeySpread * frame.ground.w, 0.010, turn)) +
                  frame.ground.y * (1.0 - open_share(sky_depth, frame.sky_matrix, kSkySpread * frame.ground.w, 0.05, turn));
-    result = vec4(0.0, 0.0, 0.0, frame.ground.z * clamp(dark, 0.0, 1.0));
+    result = frame.ground.z * clamp(dark, 0.0, 1.0);
 }

@@ -10,10 +10,17 @@ uniform bool has_surface;
 uniform vec3 base_color; // all colours are linear
 uniform bool has_colors, has_scalars, has_picture;
 uniform float gloss;
+#ifdef LOOK_GIVEN
+uniform uint look; // look_of
+#endif
 layout(binding = 2) uniform sampler2D picture;
 layout(binding = 3) uniform sampler1D scalar_colors;
 
+#ifdef SEEN
+layout(location = 0) out uvec4 result;
+#else
 layout(location = 0) out vec4 result;
+#endif
 
 const vec3 kNoValue = vec3(0.2);
 
@@ -28,15 +35,10 @@ void main() {
 #ifdef COVERED
     if (!is_covered()) discard;
 #endif
-    vec3 view = to_viewer(surface.position);
-    float size = length(facing);
-    facing = size > 0.0 ? facing / size : view;
-    if (dot(facing, view) < 0.0) facing = -facing;
-    vec3 normal = surface.normal;
-    float normal_size = length(normal);
-    normal = normal_size > 1e-3 ? normal / normal_size : facing;
-    if (dot(normal, facing) < 0.0) normal = -normal;
-
+#ifdef LOOK_GIVEN
+    result = kept(surface.position, facing, surface.normal, look);
+    return;
+#endif
     vec3 albedo = base_color;
 #ifndef PLAIN
     if (has_colors) albedo = surface.color.rgb;
@@ -63,9 +65,15 @@ void main() {
         line *= clamp(smallest_height / (5.0 * edge_width), 0.12, 0.85);
     }
 #endif
+#ifdef SEEN
+    result = kept(surface.position, facing, surface.normal, look_of(albedo, gloss));
+#else
+    vec3 normal = surface.normal;
+    turn_to_viewer(surface.position, facing, normal);
     vec3 light = shade(surface.position, facing, normal, albedo, gloss);
 #ifdef EDGES
     light = mix(light, edge_color, line);
 #endif
     result = outgoing(light);
+#endif
 }
