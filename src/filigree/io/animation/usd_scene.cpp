@@ -167,8 +167,8 @@ private:
         if (!layer_.composed_by.empty())
             return error(layer_.composed_line,
                          "'" + std::string(layer_.composed_by) +
-                             "' composes the scene of parts, which is not read; 'usdcat --flatten' makes one scene of "
-                             "it",
+                             "' composes the scene of parts, which is not read; usdcat with its option flatten makes "
+                             "one scene of it",
                          ErrorCode::unsupported);
         constexpr double kAny = -std::numeric_limits<double>::infinity();
         std::optional<double> codes, rate, start, end;

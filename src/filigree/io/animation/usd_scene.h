@@ -30,7 +30,6 @@ public:
 
     /// Faces, objects (where there are several meshes), and the points outside of time, or of the first sample.
     const Mesh& mesh() const { return mesh_; }
-    bool moves() const { return first_ < last_ || has_samples_; }
     double metres_per_unit() const { return metres_per_unit_; }
     double frames_per_second() const { return rate_; }
     /// Number of frames at a rate. Errors: unsuitable (nothing moves; too many).
