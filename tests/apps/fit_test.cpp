@@ -100,9 +100,27 @@ TEST_F(FitCommand, GltfAndModelsMoveThemselves) {
     const Json of_model = json({"fit", "first.fil", "--error", "2e-3", "-o", "second.fil"});
     EXPECT_EQ(of_model["frames"], 8);
     EXPECT_LT(of_model["driver_vertices"], 100);
+    ASSERT_TRUE(write_animation(made_.animation, path("flag.usda")).ok());
+    const Json of_usd = json({"fit", "flag.usda", "--error", "1e-3", "-o", "usd.fil"});
+    EXPECT_EQ(of_usd["frames"], 8);
+    EXPECT_LE(of_usd["rms"], 1e-3);
+    ok({"convert", "flag.usda", "back.pc2"});
+    EXPECT_EQ(bytes_of(path("back.pc2")), bytes_of(path("flag.pc2")));
     // A skin of few joints is told to be smaller as it is.
     const Ran ran = ok({"fit", "skin.glb", "--base", "600", "-o", "more.fil"});
     EXPECT_NE(ran.err.find("is a skin of"), std::string::npos) << ran.err;
+}
+
+TEST_F(FitCommand, SmallKeysAreAsPreciseAsTheFit) {
+    const Json said = json({"fit", "flag.pc2", "--mesh", "rest.obj", "--error", "1e-3", "--compress", "-o", "small.glb",
+                            "-o", "model.fil"});
+    const double fitted = said["rms"], keys = said["written"][0]["error_at_keys"];
+    EXPECT_LE(keys, fitted * 1.05);
+    const Json exact = json({"export", "model.fil", "-o", "exact.glb", "--compress", "--key-error", "1e-6"});
+    EXPECT_LT(exact["error_at_keys"], keys);
+    EXPECT_LT(std::filesystem::file_size(path("small.glb")), std::filesystem::file_size(path("exact.glb")));
+    fails(2, {"export", "model.fil", "-o", "other.glb", "--key-error", "1e-4"}, {"--key-error", "--compress"});
+    fails(2, {"export", "model.fil", "-o", "other.glb", "--compress", "--key-error", "0.5"}, {"--key-error"});
 }
 
 TEST_F(FitCommand, APageIsWritten) {
