@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Whether morph targets beside a fitted driver pay: what they leave of the error, and the bytes of both.
 
-Usage: bench/residual_morphs.py [--resolution 42]     (a few minutes; scripts/build release bench builds what it takes)
+Usage: bench/residual_morphs.py [--resolution 36]     (a few minutes; scripts/build release bench builds what it takes)
 Three faces by formulas, of 60 frames: smooth bulges, wrinkles that come and go, and bulges along rough normals. For each
 error: the smallest driver alone, then smaller drivers with the fewest morph targets (principal components of what is left,
 pulled back through the skin) that reach the same error. A target's bytes are those of its numbers, rounded to a quarter
@@ -87,7 +87,7 @@ def morphs(model, poses, positions, size, goal):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--resolution", type=int, default=42)
+    parser.add_argument("--resolution", type=int, default=36)
     options = parser.parse_args()
     print(f"{'animation':<14} {'error':>6} {'driver':>6} {'targets':>7} {'GLB':>9} {'packed':>9}")
     for name, mesh, positions in faces(options.resolution):
