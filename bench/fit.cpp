@@ -1,5 +1,6 @@
 // Fits animations made by formulas: the smallest driver for an error, what is left of it, and what it costs.
-//   fit_table [--error 1e-4] [--base N] [--choice rest|motion] [--frames 60] [--scan MESH] [--threads N] [NAME...]
+//   fit_table [--error 1e-4] [--base N] [--choice rest|motion] [--weight-rounds N] [--frames 60] [--scan MESH]
+//             [--threads N] [NAME...]
 // A line each. Names: flag, rod, crumple, skin, bulges, fluid; scan-skin, scan-bulges and scan-warp move --scan MESH
 // (scan-warp bends, twists and distorts it; from a .pc2 file, as large scans are). Default: all.
 //   fit_table --animation FILE [--mesh REST] ...    fits a file: a glTF that moves, or a cache with its mesh
@@ -49,6 +50,7 @@ Options read_options(int count, char** arguments) {
         if (name == "--error") options.fit.error = std::atof(value.c_str());
         if (name == "--max-error") options.fit.max_error = std::atof(value.c_str());
         if (name == "--base") options.fit.base = std::size_t(std::atol(value.c_str()));
+        if (name == "--weight-rounds") options.fit.weight_rounds = unsigned(std::atoi(value.c_str()));
         if (name == "--frames") options.frames = std::size_t(std::atol(value.c_str()));
         if (name == "--threads") options.threads = unsigned(std::atoi(value.c_str()));
         if (name == "--scan") options.scan = value;
@@ -135,16 +137,23 @@ void run(const std::string& name, const Options& options) {
         const FitReport& report = fitted->report;
         const fs::path packed = folder / "packed.fil", glb = folder / "skin.glb";
         const unsigned bits = options.fit.error < 9e-5 ? 16 : 14;
-        (void)pack_model(fitted->model, fitted->poses, {.bits = bits}, packed).value();
+        const PackReport packing =
+            pack_model(fitted->model, fitted->poses, {.bits = bits, .records = report.has_free_weights}, packed)
+                .value();
+        const double of_packed =
+            animation_error(read_model(packed).value(), read_poses(packed).value(), animation, packing.vertex_order)
+                .value()
+                .rms /
+            report.diagonal;
         (void)write_skin_glb(fitted->model, frames_of(fitted->poses), {.compress = true, .key_error = report.rms}, glb)
             .value();
         std::printf(
-            "%-12s %8zu x %-4zu %-6s %6zu  %8.2e %8.2e  %5.2f %5.2f  %9.0f %8.0f %8.0f  %5.0f  %2zu  %6.1f %6.1f "
+            "%-12s %8zu x %-4zu %-6s %6zu  %8.2e %8.2e  %5.2f %5.2f  %9.0f %8.0f %8.0f %8.2e  %5.0f  %2zu  %6.1f %6.1f "
             "%5.0f\n",
             name.c_str(), report.vertices, report.frames, std::string(name_of(report.choice)).c_str(),
             report.driver_vertices, report.rms, report.max, report.normal_mean_deg, report.normal_p95_deg,
-            kilobytes(cache), kilobytes(glb), kilobytes(packed), kilobytes(cache) / kilobytes(packed), report.tries,
-            end.wall - begin.wall, end.processor - begin.processor, peak_megabytes());
+            kilobytes(cache), kilobytes(glb), kilobytes(packed), of_packed, kilobytes(cache) / kilobytes(packed),
+            report.tries, end.wall - begin.wall, end.processor - begin.processor, peak_megabytes());
     } else {
         std::printf("%-12s %s (%.1f s)\n", name.c_str(), fitted.error().message.c_str(), end.wall - begin.wall);
     }
@@ -157,9 +166,9 @@ void run(const std::string& name, const Options& options) {
 int main(int count, char** arguments) {
     const Options options = read_options(count, arguments);
     if (options.folder.empty())
-        std::printf("%-12s %8s   %-4s %-6s %6s  %8s %8s  %5s %5s  %9s %8s %8s  %5s  %2s  %6s %6s %5s\n", "animation",
-                    "vertices", "fr.", "choice", "driver", "rms", "max", "n.avg", "n.p95", "PC2 kB", "GLB kB", "packed",
-                    "times", "#", "s", "cpu s", "MB");
+        std::printf("%-12s %8s   %-4s %-6s %6s  %8s %8s  %5s %5s  %9s %8s %8s %8s  %5s  %2s  %6s %6s %5s\n",
+                    "animation", "vertices", "fr.", "choice", "driver", "rms", "max", "n.avg", "n.p95", "PC2 kB",
+                    "GLB kB", "packed", "its rms", "times", "#", "s", "cpu s", "MB");
     for (const std::string& name : options.names) run(name, options);
     if (options.most_megabytes > 0 && peak_megabytes() > options.most_megabytes) {
         std::printf("%.0f MB at most are above %.0f\n", peak_megabytes(), options.most_megabytes);

@@ -101,7 +101,8 @@ int flg_read_clip(const void* stream, size_t size, uint32_t numbers, const uint3
         for (uint32_t i = 0; i < vertices; ++i)
             for (uint32_t k = 0; k < numbers; ++k) {
                 const uint32_t code = flg_read_number(&in, s->shares + flg_coefficient_context(c, k));
-                const int64_t expected = beside[vertex[i]] != 0xffffffffu ? steps[(size_t)beside[vertex[i]] * numbers + k] : 0,
+                const int64_t expected =
+                                  beside[vertex[i]] != 0xffffffffu ? steps[(size_t)beside[vertex[i]] * numbers + k] : 0,
                               value = expected + flg_with_sign(code);
                 if (value > FLG_LARGEST_COEFFICIENT || value < -FLG_LARGEST_COEFFICIENT || in.is_damaged) return 0;
                 steps[(size_t)vertex[i] * numbers + k] = (int32_t)value;

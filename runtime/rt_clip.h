@@ -12,9 +12,10 @@ extern "C" {
 #endif
 
 enum {
-    FLG_CLIP_FRAMES = 128,  /* of a block, at most */
-    FLG_CLIP_NUMBERS = 12,  /* of a vertex, at most */
-    FLG_CURVE_CONTEXTS = 40, /* curves that matter less have smaller numbers: so has each its own, the last ones share */
+    FLG_CLIP_FRAMES = 128, /* of a block, at most */
+    FLG_CLIP_NUMBERS = 12, /* of a vertex, at most */
+    FLG_CURVE_CONTEXTS =
+        40, /* curves that matter less have smaller numbers: so has each its own, the last ones share */
     FLG_CURVE_ENTRY = 2,
     FLG_COEFFICIENT = 4,
     FLG_CLIP_CONTEXTS = FLG_COEFFICIENT + 3 * FLG_CURVE_CONTEXTS,

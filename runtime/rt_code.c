@@ -6,7 +6,6 @@
 #include <math.h>
 #include <string.h>
 
-
 /* ---- Symbols, read or written ---- */
 
 typedef struct flg_coder {
@@ -337,8 +336,8 @@ static void code_record(flg_walk* w, uint32_t v, uint32_t a, uint32_t b) {
         cell = beyond;
     }
     {
-        const uint32_t ways[6] = {cell, w->planes[cell].beside[0], w->planes[cell].beside[1], w->planes[cell].beside[2],
-                                  near_a, near_b};
+        const uint32_t ways[6] = {
+            cell, w->planes[cell].beside[0], w->planes[cell].beside[1], w->planes[cell].beside[2], near_a, near_b};
         const uint32_t context = CELL + (spot.behind < 3);
 #ifdef FLG_WITH_WRITER
         if (is_writing(&w->coder)) {
@@ -376,11 +375,13 @@ static void code_record(flg_walk* w, uint32_t v, uint32_t a, uint32_t b) {
         if (way > 0) spot = closest_spot(w->planes + cell, point);
     }
     {
-        const int32_t* near_off = a != FLG_NONE && w->cell_of[a] == cell   ? w->off + 2 * (size_t)a
-                                  : b != FLG_NONE && w->cell_of[b] == cell ? w->off + 2 * (size_t)b
-                                                                           : NULL;
+        const int32_t *of_a = a != FLG_NONE && w->cell_of[a] == cell ? w->off + 2 * (size_t)a : NULL,
+                      *of_b = b != FLG_NONE && w->cell_of[b] == cell ? w->off + 2 * (size_t)b : NULL;
         for (uint32_t k = 0; k < 2 && symbol % 2 != 0; ++k) {
-            const uint32_t expected = near_off ? (uint32_t)near_off[k] : 0;
+            const uint32_t expected = of_a && of_b ? (uint32_t)((of_a[k] + of_b[k]) / 2)
+                                      : of_a       ? (uint32_t)of_a[k]
+                                      : of_b       ? (uint32_t)of_b[k]
+                                                   : 0;
             off[k] = (int32_t)(expected + code_difference(&w->coder, WEIGHT + k, (uint32_t)off[k] - expected));
         }
     }
@@ -421,17 +422,26 @@ FLG_INLINE uint32_t code_corner(flg_walk* w, uint32_t context, uint32_t left, ui
 #endif
     *symbol = code_symbol(&w->coder, context, *symbol);
     switch (*symbol) {
-    case MEETS_LEFT: number = left; break;
-    case MEETS_RIGHT: number = right; break;
-    case MEETS_OLD: number = code_bits(&w->coder, number, flg_bits_to_name(w->vertices)); break;
-    case MEETS_DRIVER: number = code_bits(&w->coder, number, flg_bits_to_name(w->sizes->driver_vertices)); break;
+    case MEETS_LEFT:
+        number = left;
+        break;
+    case MEETS_RIGHT:
+        number = right;
+        break;
+    case MEETS_OLD:
+        number = code_bits(&w->coder, number, flg_bits_to_name(w->vertices));
+        break;
+    case MEETS_DRIVER:
+        number = code_bits(&w->coder, number, flg_bits_to_name(w->sizes->driver_vertices));
+        break;
     case MEETS_NEW:
         number = w->is_driver ? code_bits(&w->coder, number, flg_bits_to_name(w->vertices)) : w->numbered++;
         break;
-    default: return 0;
+    default:
+        return 0;
     }
-    if (number >= w->vertices || ((*symbol == MEETS_NEW || *symbol == MEETS_DRIVER) ? w->around[number] != 0
-                                                                                    : w->around[number] == 0)) {
+    if (number >= w->vertices ||
+        ((*symbol == MEETS_NEW || *symbol == MEETS_DRIVER) ? w->around[number] != 0 : w->around[number] == 0)) {
         walk_fails(w, FLG_DAMAGED);
         return 0;
     }
@@ -910,10 +920,10 @@ static void code_corner_values(flg_walk* w, const flg_valued* values, const flg_
         for (uint32_t c = begin; c < end; ++c) {
             const uint32_t v = faces->corners[c], wanted = source_of ? source_of[c] : FLG_NONE,
                            named = number && wanted != FLG_NONE ? number[wanted] : FLG_NONE;
-            uint32_t way = source_of && wanted == FLG_NONE      ? MISSING
-                           : named == FLG_NONE                  ? FRESH
-                           : named == last_at[v] ? SAME
-                                                                : OLDER,
+            uint32_t way = source_of && wanted == FLG_NONE ? MISSING
+                           : named == FLG_NONE             ? FRESH
+                           : named == last_at[v]           ? SAME
+                                                           : OLDER,
                      item = FLG_NONE;
             way = code_symbol(&w->coder, values->base + WHICH + (last_at[v] != FLG_NONE), way);
             if (way == SAME) {
@@ -923,7 +933,9 @@ static void code_corner_values(flg_walk* w, const flg_valued* values, const flg_
                 if (item >= done) walk_fails(w, FLG_DAMAGED);
             } else if (way == FRESH && done < count) {
                 const uint32_t before = c > begin ? item_of[c - 1] : FLG_NONE,
-                               one = before != FLG_NONE ? before : last_at[v] != FLG_NONE ? last_at[v] : done - 1,
+                               one = before != FLG_NONE       ? before
+                                     : last_at[v] != FLG_NONE ? last_at[v]
+                                                              : done - 1,
                                two = c > begin + 1 && item_of[c - 2] != FLG_NONE ? item_of[c - 2] : one;
                 item = done++;
                 if (number) number[wanted] = item;

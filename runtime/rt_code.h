@@ -39,7 +39,7 @@ enum {
     FLG_NORMALS_OF_CORNERS = 5
 };
 typedef struct flg_code_values {
-    char name[8]; /* of the plain section */
+    char name[8];                         /* of the plain section */
     uint32_t index, kind, columns, count; /* count: items */
     double low[4], step[4];
 } flg_code_values;
@@ -75,8 +75,8 @@ FLG_INLINE double flg_most_unpacked(uint64_t file_bytes) {
 
 /* The memory that a model of these sizes takes while it is read. */
 FLG_INLINE double flg_code_bytes(const flg_code_sizes* s) {
-    return 78.0 * (double)s->vertices + 4.0 * ((double)s->corners + (double)s->faces) +
-           400.0 * (double)s->cells + 64.0 * (double)s->driver_vertices;
+    return 78.0 * (double)s->vertices + 4.0 * ((double)s->corners + (double)s->faces) + 400.0 * (double)s->cells +
+           64.0 * (double)s->driver_vertices;
 }
 
 /* Writing, in libfiligree alone (FLG_WITH_WRITER): what is written. Vertices, faces and corners are the source's. */
@@ -88,19 +88,19 @@ typedef struct flg_code_source {
     /* The face that has an edge and was not asked for yet, 0xffffffff: none; *corner: that of `from`. from 0xffffffff:
      * any face. of_driver: of the driver's faces. */
     uint32_t (*face_at)(void* user, int of_driver, uint32_t from, uint32_t to, uint32_t* corner);
-    flg_faces mesh, driver;      /* the driver's corners are its own numbers */
-    const int32_t* places;       /* 3 a vertex */
-    const uint32_t* driver_of;   /* of each vertex: which of the driver's it is, or 0xffffffff */
-    const uint32_t* vertex_of;   /* of each of the driver's vertices */
-    const float* driver_rest;    /* FLG_CODE_DRIVER_BEHIND: 3 floats each */
-    const uint32_t* cells;       /* 3 driver vertices each */
-    const uint32_t* cell;        /* of each vertex */
-    const float *u, *v;          /* of each vertex */
-    double anchor_tolerance;     /* how far a vertex's anchor may move: then the expected weights are taken */
+    flg_faces mesh, driver;    /* the driver's corners are its own numbers */
+    const int32_t* places;     /* 3 a vertex */
+    const uint32_t* driver_of; /* of each vertex: which of the driver's it is, or 0xffffffff */
+    const uint32_t* vertex_of; /* of each of the driver's vertices */
+    const float* driver_rest;  /* FLG_CODE_DRIVER_BEHIND: 3 floats each */
+    const uint32_t* cells;     /* 3 driver vertices each */
+    const uint32_t* cell;      /* of each vertex */
+    const float *u, *v;        /* of each vertex */
+    double anchor_tolerance;   /* how far a vertex's anchor may move: then the expected weights are taken */
     /* Written: the number of each vertex, and what a reader gets in the order in which it gets it. */
     uint32_t *number_of, *face_order, *corner_order; /* the source's face and corner that each is */
     uint32_t *read_corners, *read_offsets;           /* read_offsets: where faces differ in size */
-    double* moved; /* of each vertex: how far its anchor moves */
+    double* moved;                                   /* of each vertex: how far its anchor moves */
 } flg_code_source;
 enum { FLG_MESH_CONTEXTS = 112, FLG_VALUE_CONTEXTS = 64 };
 
@@ -111,8 +111,8 @@ FLG_SHARED void flg_closest_anchor(const float* corner0, const float* corner1, c
 FLG_SHARED flg_status flg_write_code(const flg_code_sizes* sizes, const flg_code_source* source,
                                      const flg_code_input* memory);
 /* Writes values, a section "rt.val". faces: of the mesh as it is read (offsets NULL where they have one size). items:
- * `columns` integers each, of vertices and faces in the order in which they are read. item_of: of each corner; for kinds
- * of corners alone; each item is used. */
+ * `columns` integers each, of vertices and faces in the order in which they are read. item_of: of each corner; for
+ * kinds of corners alone; each item is used. */
 FLG_SHARED flg_status flg_write_values(const flg_code_sizes* sizes, const flg_code_values* values,
                                        const flg_code_source* source, const flg_faces* faces, const int32_t* items,
                                        const uint32_t* item_of, const flg_code_input* memory);

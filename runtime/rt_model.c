@@ -176,7 +176,7 @@ flg_status flg_find_section(const void* bytes, size_t size, const char* name, ui
 typedef struct flg_opening {
     flg_file file;
     flg_model* model;
-    flg_piece* scratch; /* until opening ends */
+    flg_piece* scratch;         /* until opening ends */
     flg_plain_section* decoded; /* what the streams of a packed model stand for */
     uint32_t flags;
     flg_status status;

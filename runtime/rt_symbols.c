@@ -1,13 +1,15 @@
 #include "rt_symbols.h"
 
 enum { FLG_LONGEST_PAUSE = 2048 };
-#define FLG_PAIR(e) {2u << ((e) - 1), (e) - 1}, {3u << ((e) - 1), (e) - 1}
-#define FLG_DIRECT(s) {s, 0}, {(s) + 1, 0}, {(s) + 2, 0}, {(s) + 3, 0}
+#define FLG_PAIR(e)                                                                                                    \
+    {2u << ((e)-1), (e)-1}, { 3u << ((e)-1), (e)-1 }
+#define FLG_DIRECT(s)                                                                                                  \
+    {s, 0}, {(s) + 1, 0}, {(s) + 2, 0}, { (s) + 3, 0 }
 const flg_number_symbol flg_number_symbols[FLG_SYMBOLS] = {
-    FLG_DIRECT(0), FLG_DIRECT(4), FLG_DIRECT(8), FLG_DIRECT(12), FLG_PAIR(4),  FLG_PAIR(5),  FLG_PAIR(6),
-    FLG_PAIR(7),   FLG_PAIR(8),   FLG_PAIR(9),   FLG_PAIR(10),   FLG_PAIR(11), FLG_PAIR(12), FLG_PAIR(13),
-    FLG_PAIR(14),  FLG_PAIR(15),  FLG_PAIR(16),  FLG_PAIR(17),   FLG_PAIR(18), FLG_PAIR(19), FLG_PAIR(20),
-    FLG_PAIR(21),  FLG_PAIR(22),  FLG_PAIR(23),  FLG_PAIR(24),   FLG_PAIR(25), FLG_PAIR(26), {2u << 25, 25}, /* damage */
+    FLG_DIRECT(0), FLG_DIRECT(4), FLG_DIRECT(8), FLG_DIRECT(12), FLG_PAIR(4),  FLG_PAIR(5),  FLG_PAIR(6),  FLG_PAIR(7),
+    FLG_PAIR(8),   FLG_PAIR(9),   FLG_PAIR(10),  FLG_PAIR(11),   FLG_PAIR(12), FLG_PAIR(13), FLG_PAIR(14), FLG_PAIR(15),
+    FLG_PAIR(16),  FLG_PAIR(17),  FLG_PAIR(18),  FLG_PAIR(19),   FLG_PAIR(20), FLG_PAIR(21), FLG_PAIR(22), FLG_PAIR(23),
+    FLG_PAIR(24),  FLG_PAIR(25),  FLG_PAIR(26),  {2u << 25, 25}, /* damage */
     {0, 32}};
 #undef FLG_PAIR
 #undef FLG_DIRECT

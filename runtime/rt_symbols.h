@@ -54,7 +54,8 @@ FLG_SHARED void flg_fetch_last_bits(flg_symbols* in, uint32_t count);
 /* States are this to 2^32 - 1. */
 static const uint32_t FLG_LOWEST_STATE = 1u << 16;
 
-/* Symbols cannot be guessed, and neither can branches that depend on them: so there are none but at the stream's end. */
+/* Symbols cannot be guessed, and neither can branches that depend on them: so there are none but at the stream's end.
+ */
 FLG_INLINE uint32_t flg_read_symbol(flg_symbols* in, flg_shares* shares) {
     uint32_t* state = in->states + in->turn++ % 4;
     const uint32_t place = *state & (FLG_SHARES - 1);
@@ -107,9 +108,7 @@ FLG_INLINE uint32_t flg_read_number(flg_symbols* in, flg_shares* shares) {
 }
 
 FLG_INLINE int32_t flg_with_sign(uint32_t value) { return (int32_t)(value >> 1) ^ -(int32_t)(value & 1); }
-FLG_INLINE uint32_t flg_without_sign(int32_t value) {
-    return ((uint32_t)value << 1) ^ (value < 0 ? 0xffffffffu : 0u);
-}
+FLG_INLINE uint32_t flg_without_sign(int32_t value) { return ((uint32_t)value << 1) ^ (value < 0 ? 0xffffffffu : 0u); }
 
 /* Bits that name one of `count`. */
 FLG_INLINE uint32_t flg_bits_to_name(uint64_t count) {

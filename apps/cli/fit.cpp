@@ -36,13 +36,17 @@ struct FitArguments {
     PoseFileOptions pose_file;
     AnimationOutput animation;
 
-    bool bound_weights = false;
+    bool bound_weights = false, free_weights = false;
 
     bool rounds() const {
         return profile == FitProfile::compact || profile == FitProfile::stream || profile == FitProfile::runtime;
     }
-    /// Whether a packed file binds vertices anew.
-    bool binds_anew() const { return bound_weights || profile == FitProfile::stream || keep_order; }
+    /// Rounds in which weights move: none where a packed file would lose them, or be larger by them as it often is.
+    unsigned weight_rounds() const {
+        constexpr unsigned kRounds = 3;
+        const bool packs_none = profile == FitProfile::compact || profile == FitProfile::stream;
+        return bound_weights || (packs_none && !free_weights) ? 0 : kRounds;
+    }
 };
 
 bool is_fil_path(const std::string& path) { return lower_extension(path_of(path)) == ".fil"; }
@@ -69,6 +73,8 @@ void check(const FitArguments& options, const Session& session) {
     if (!packing.empty() && none(is_fil_path)) refuse(packing + " belongs to a model file; give one with -o NAME.fil.");
     if (const std::string given = session.first_given({"--bits", "--keep-order"}); !given.empty() && !options.rounds())
         refuse(given + " belongs to --profile compact, stream or runtime, which round.");
+    if (options.free_weights && (options.profile == FitProfile::stream || options.keep_order))
+        refuse("--free-weights cannot go with --profile stream and --keep-order: such files bind vertices anew.");
     if (options.keep_order && options.profile == FitProfile::runtime)
         refuse("--keep-order belongs to --profile compact.");
     if (options.web) return;
@@ -246,7 +252,7 @@ void run(FitArguments options, Session& session) {
         options.fit.rest_frame = require(least_stretched_frame(input.animation, session.context()));
     const double start = now_seconds();
     FitOptions fit = options.fit;
-    if (options.binds_anew()) fit.weight_rounds = 0;
+    fit.weight_rounds = options.weight_rounds();
     if (options.rounds() && !fit.base) fit.error = left_for_fit(fit.error);
     const Fitted fitted = require(with_hint(fit_animation(input.animation, fit, session.context()), ErrorCode::mismatch,
                                             "--mesh and the animation belong to one object."));
@@ -316,7 +322,11 @@ Command fit_command() {
                                           "once) or lossless. "
                                           "The error asked for holds for the packed file (default: a plain model)"),
                        Option("--bound-weights", options->bound_weights,
-                              "Keep the weights that binding gives to vertices: the driver is larger, the fit faster"),
+                              "Keep the weights that binding gives to vertices: a larger driver, a faster fit (default "
+                              "with --profile compact and stream)"),
+                       Option("--free-weights", options->free_weights,
+                              "Move weights with --profile compact too: smaller for characters, larger for cloth")
+                           .excludes({"--bound-weights"}),
                        Option("--bits", options->bits,
                               "With --profile compact, stream or runtime: bits of a position (default: by the error)")
                            .between(10, 16),

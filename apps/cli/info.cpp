@@ -167,7 +167,8 @@ Json vertices_json(const std::vector<Index>& ids) {
 void describe_coding(const ModelOutline& model, Report& report) {
     const Packing& coding = *model.coding;
     report.add("packed",
-               fmt::format("{} bits{}{}{}", coding.options.bits, coding.options.records  ? ", for the runtime"
+               fmt::format("{} bits{}{}{}", coding.options.bits,
+                           coding.options.records  ? ", for the runtime"
                            : coding.options.levels ? ", as a stream"
                                                    : "",
                            coding.options.surface ? ", by surface" : "",
@@ -176,9 +177,9 @@ void describe_coding(const ModelOutline& model, Report& report) {
                {{"bits", coding.options.bits},
                 {"surface", coding.options.surface},
                 {"keep_order", coding.options.keep_order},
-                {"profile", coding.options.records ? "runtime"
-                 : coding.options.levels ? "stream"
-                                         : "compact"},
+                {"profile", coding.options.records  ? "runtime"
+                            : coding.options.levels ? "stream"
+                                                    : "compact"},
                 {"step_units", coding.step}});
     add_coding_shares(coding.bytes, model.levels.back().vertices, std::nullopt, report);
     add_stream_marks(model, report);

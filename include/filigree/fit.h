@@ -39,8 +39,10 @@ struct FitOptions {
     /// Unset: what has the least error on some frames.
     std::optional<DriverChoice> choice = {};
     /// Rounds, at most, in which weights of vertices are moved to where the mesh follows more closely; 0: weights stay
-    /// as vertices were bound. PackOptions::records keeps moved weights; other packed files lose them.
-    unsigned weight_rounds = 3;
+    /// as vertices were bound. Three rounds make the driver smaller: to two thirds for cloth, to a third for characters
+    /// with sharp weights. Each takes three passes over the frames more. PackOptions::records keeps moved weights;
+    /// other packed files lose them.
+    unsigned weight_rounds = 0;
 };
 
 /// Distances as fractions of the rest shape's diagonal.
@@ -56,7 +58,7 @@ struct FitReport {
     DriverChoice choice = DriverChoice::rest;
     /// Vertices that lie at one place at rest and part in some frame.
     std::size_t parted = 0;
-    std::size_t tries = 0; ///< drivers that were fitted to all frames
+    std::size_t tries = 0;         ///< drivers that were fitted to all frames
     bool has_free_weights = false; ///< whether weights are not those of binding
 };
 

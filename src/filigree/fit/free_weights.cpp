@@ -9,8 +9,9 @@ namespace filigree {
 namespace {
 
 constexpr std::size_t kRecordGrain = 4096;
-constexpr double kDamping = 1e-9;       // of the trace: keeps the step small where no frame says anything
-constexpr double kWorthARound = 0.97;   // of the error before: what a round has to reach for another one
+constexpr double kDamping = 1e-9;     // of the trace: keeps the step small where no frame says anything
+constexpr double kWorthARound = 0.97; // of the error before: what a round has to reach for another one
+constexpr double kLeastGain = 0.03;   // of a vertex's mean squared error: weights that win less stay, and cost no bits
 
 /// What a driver vertex gives to the vertices that it carries.
 struct Carrier {
@@ -49,6 +50,7 @@ Vec3d restored(const Hang& hang, const std::vector<Carrier>& carriers, double u,
 /// Squares of a vertex's error as a function of its weights, near where they are.
 struct Quadratic {
     double uu = 0, uv = 0, vv = 0, ur = 0, vr = 0;
+    double here = 0; ///< where they are
 
     /// What is to be added to the error where the weights move so far.
     double at(double du, double dv) const {
@@ -143,6 +145,7 @@ Result<std::size_t> move_weights(Model& model, std::span<const Pose> poses, cons
             sum.vv += dv.squaredNorm();
             sum.ur += du.dot(off);
             sum.vr += dv.dot(off);
+            sum.here += off.squaredNorm();
         });
         if (context.is_cancelled()) return cancelled_error();
     }
@@ -164,9 +167,12 @@ Result<std::size_t> move_weights(Model& model, std::span<const Pose> poses, cons
         });
         if (context.is_cancelled()) return cancelled_error();
     }
+    double squares = 0;
+    for (const Quadratic& sum : sums) squares += sum.here;
+    const double least = kLeastGain * squares / double(std::max<std::size_t>(vertices, 1));
     std::size_t moved = 0;
     for (std::size_t r = 0; r < records; ++r) {
-        if (!(won[r] > 0)) continue;
+        if (!(won[r] > least)) continue;
         detail.u[r] = tried[r][0];
         detail.v[r] = tried[r][1];
         ++moved;

@@ -59,7 +59,8 @@ std::string encode_clip(const ClipFrames& frames, std::span<const double> weight
     for (std::size_t c = 0; c < curve_count; ++c) {
         std::int32_t before = 0, slope = 0;
         for (Eigen::Index t = 0; t < count; ++t) {
-            const auto entry = std::int32_t(std::lround(eigenvectors(t, count - 1 - Eigen::Index(c)) * double(FLG_CURVE_ONE)));
+            const auto entry =
+                std::int32_t(std::lround(eigenvectors(t, count - 1 - Eigen::Index(c)) * double(FLG_CURVE_ONE)));
             out.number_with_sign(FLG_CURVE_ENTRY + (t > 0), entry - before - slope);
             slope = t > 0 ? entry - before : 0;
             before = entry;

@@ -1,6 +1,7 @@
 // Symbols in as few bits as their frequencies allow: range asymmetric numeral systems [Duda 2013], four states in turn.
 // Frequencies are counted while coding, on both sides alike, so that no tables are stored: a stream of a few hundred
-// symbols is as well off as a long one. Integers alone: every machine reads what another wrote. The reader is the runtime's.
+// symbols is as well off as a long one. Integers alone: every machine reads what another wrote. The reader is the
+// runtime's.
 #pragma once
 
 #include "runtime/rt_symbols.h"

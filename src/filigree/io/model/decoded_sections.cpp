@@ -38,10 +38,17 @@ DecodedSections::DecodedSections(const Find& find, std::uint64_t file_bytes) {
     const flg_code_input from{&input, section_of, take, flg_most_unpacked(file_bytes)};
     flg_plain_section* first = nullptr;
     switch (flg_read_code(&from, &first)) {
-    case FLG_OK: break;
-    case FLG_NEWER: failure_ = Failure::newer; return;
-    case FLG_NO_MEMORY: failure_ = Failure::no_memory; return;
-    default: failure_ = Failure::damaged; return;
+    case FLG_OK:
+        break;
+    case FLG_NEWER:
+        failure_ = Failure::newer;
+        return;
+    case FLG_NO_MEMORY:
+        failure_ = Failure::no_memory;
+        return;
+    default:
+        failure_ = Failure::damaged;
+        return;
     }
     for (const flg_plain_section* section = first; section; section = section->next) {
         const std::string name(section->name, strnlen(section->name, sizeof section->name));

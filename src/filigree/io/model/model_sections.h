@@ -13,9 +13,9 @@
 #include <cstring>
 #include <map>
 #include <memory>
+#include <new>
 #include <optional>
 #include <span>
-#include <new>
 #include <string>
 #include <utility>
 #include <vector>
@@ -421,8 +421,8 @@ private:
     }
 
     const FileReader& file_;
-    std::map<Key, FileSection> sections_; ///< of equals the first
-    std::unique_ptr<Lossless> lossless_;  ///< of a lossless file, whose plain sections these are
+    std::map<Key, FileSection> sections_;      ///< of equals the first
+    std::unique_ptr<Lossless> lossless_;       ///< of a lossless file, whose plain sections these are
     std::unique_ptr<DecodedSections> decoded_; ///< of a file of the profile `runtime`
 };
 

@@ -77,9 +77,7 @@ flg_code_source source_of(Writing& writing) {
     source.number = [](void* user, std::uint32_t context, std::uint32_t value) {
         writing_of(user).out.number(context, value);
     };
-    source.bits = [](void* user, std::uint32_t value, std::uint32_t count) {
-        writing_of(user).out.bits(value, count);
-    };
+    source.bits = [](void* user, std::uint32_t value, std::uint32_t count) { writing_of(user).out.bits(value, count); };
     source.face_at = [](void* user, int of_driver, std::uint32_t from, std::uint32_t to, std::uint32_t* corner) {
         FaceFinder& finder = of_driver != 0 ? writing_of(user).driver : writing_of(user).mesh;
         *corner = finder.take(from, to);
@@ -110,8 +108,9 @@ Index size_of_all(std::span<const Index> offsets) {
 void require_written(flg_status status) {
     if (status == FLG_NO_MEMORY) throw std::bad_alloc();
     if (status != FLG_OK)
-        throw Error{ErrorCode::unsuitable, "The model cannot be packed for the runtime: it has too many faces, or sizes "
-                                           "that are no floats; the profile lossless takes it."};
+        throw Error{ErrorCode::unsuitable,
+                    "The model cannot be packed for the runtime: it has too many faces, or sizes "
+                    "that are no floats; the profile lossless takes it."};
 }
 
 /// A place on an octahedron [Meyer et al. 2010].
@@ -186,7 +185,8 @@ private:
             std::copy(steps.begin(), steps.end(), items.begin() + std::ptrdiff_t(at * columns));
         };
         if (attribute.corners.empty()) {
-            for (std::size_t v = 0; v < attribute.values.size(); ++v) put(source_.number_of[v], of(attribute.values[v]));
+            for (std::size_t v = 0; v < attribute.values.size(); ++v)
+                put(source_.number_of[v], of(attribute.values[v]));
             values.count = static_cast<std::uint32_t>(attribute.values.size());
             return write(values, items);
         }
@@ -269,6 +269,50 @@ Mesh rest_of(const Mesh& mesh) {
     return rest;
 }
 
+/// How finely weights have to be kept for poses to be off by less than a third of the error through them (rms).
+std::uint32_t weight_bits_for(const Model& model, const PoseSequence& poses, double error) {
+    constexpr std::uint32_t kFewest = 4;
+    constexpr std::size_t kFrames = 8;
+    const BlendDetail& detail = model.detail;
+    if (poses.empty() || poses.frames[0].gradients.empty()) return FLG_WEIGHT_BITS;
+    std::vector<Vec3d> rest;
+    for (const Vec3f& p : driver_positions(model)) rest.push_back(p.cast<double>());
+    double squares = 0; // of what a whole step of both weights moves
+    std::size_t count = 0;
+    for (std::size_t k = 0; k < std::min(kFrames, poses.frames.size()); ++k) {
+        const Pose& pose =
+            poses.frames[(2 * k + 1) * poses.frames.size() / (2 * std::min(kFrames, poses.frames.size()))];
+        std::vector<Mat3d> gradients;
+        std::vector<Vec3d> shifts;
+        for (std::size_t i = 0; i < rest.size(); ++i) {
+            gradients.push_back(pose.gradients[i].cast<double>());
+            shifts.push_back(pose.positions[i].cast<double>() - 0.5 * (gradients[i] * rest[i]));
+        }
+        for (std::size_t c = 0; c < detail.cells.size(); ++c)
+            for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
+                const Triangle& cell = detail.cells[c];
+                const std::array<double, 3> b = {1 - double(detail.u[r]) - double(detail.v[r]), double(detail.u[r]),
+                                                 double(detail.v[r])};
+                Vec3d middle = Vec3d::Zero();
+                Mat3d gradient = Mat3d::Zero();
+                for (std::size_t j = 0; j < 3; ++j) {
+                    middle += b[j] * rest[cell[j]];
+                    gradient += b[j] * gradients[cell[j]];
+                }
+                const Vec3d q = model.mesh.positions[detail.order[r]].cast<double>() - 0.5 * middle;
+                for (std::size_t j = 1; j < 3; ++j)
+                    squares += (shifts[cell[j]] - shifts[cell[0]] + (gradients[cell[j]] - gradients[cell[0]]) * q -
+                                0.5 * (gradient * (rest[cell[j]] - rest[cell[0]])))
+                                   .squaredNorm();
+                ++count;
+            }
+    }
+    const double most = error / 3 * bounds(model.mesh).diagonal();
+    std::uint32_t bits = kFewest; // a step rounds by its twelfth's root
+    while (bits < FLG_WEIGHT_BITS && squares / double(count) / 12 > std::pow(most * double(1u << bits), 2)) ++bits;
+    return bits;
+}
+
 std::vector<Index> numbered(const std::vector<Index>& vertices, std::span<const Index> number_of) {
     std::vector<Index> numbers;
     for (const Index v : vertices) numbers.push_back(number_of[v]);
@@ -313,7 +357,7 @@ Result<RuntimeCode> code_for_runtime(const Model& model, const PoseSequence& pos
     sizes.driver_faces = static_cast<std::uint32_t>(driver.face_count());
     sizes.cells = static_cast<std::uint32_t>(detail.cells.size());
     sizes.bits = options.bits;
-    sizes.weight_bits = FLG_WEIGHT_BITS;
+    sizes.weight_bits = weight_bits_for(model, poses, options.clip_error);
     const Box box = bounds(mesh);
     for (int k = 0; k < 3; ++k) sizes.low[k] = box.min[k];
     const double longest = box.size().maxCoeff();
@@ -397,7 +441,8 @@ Result<RuntimeCode> code_for_runtime(const Model& model, const PoseSequence& pos
 }
 
 void write_runtime_code(SectionWriter& out, const RuntimeCode& coded) {
-    out.items("rt.par", std::span(reinterpret_cast<const std::array<char, sizeof(flg_code_sizes)>*>(coded.sizes.data()), 1), 0);
+    out.items("rt.par",
+              std::span(reinterpret_cast<const std::array<char, sizeof(flg_code_sizes)>*>(coded.sizes.data()), 1), 0);
     write_mesh_sections(out, coded.rest, false, false);
     if (!coded.driver_positions.empty()) out.array("rt.dpos", coded.driver_positions);
     out.bytes("rt.mesh", coded.mesh, 0);
@@ -419,8 +464,8 @@ void write_runtime_code(SectionWriter& out, const RuntimeCode& coded) {
 
 bool has_free_weights(const Model& model) {
     const BlendDetail& detail = model.detail;
-    constexpr double kFar = 1e-4;        // of the diagonal
-    constexpr std::size_t kFewOf = 100;  // of so many vertices one may be off
+    constexpr double kFar = 1e-4;       // of the diagonal
+    constexpr std::size_t kFewOf = 100; // of so many vertices one may be off
     const std::vector<Vec3f> driver = driver_positions(model);
     std::vector<bool> is_poor(model.mesh.vertex_count()); // those are bound otherwise
     for (const std::vector<Index>* list : {&detail.across_gap, &detail.facing_away})

@@ -12,8 +12,8 @@ namespace filigree {
 struct RuntimeCode {
     std::string sizes; ///< the section "rt.par"
     std::string mesh;
-    std::string attributes;          ///< the section "rt.att"
-    std::vector<std::string> values; ///< a stream an attribute
+    std::string attributes;              ///< the section "rt.att"
+    std::vector<std::string> values;     ///< a stream an attribute
     std::vector<Vec3f> driver_positions; ///< of a driver made elsewhere; else empty
     std::vector<Index> across_gap, facing_away;
     Mesh rest;
