@@ -632,7 +632,7 @@ static void code_face(flg_walk* w) {
         if (symbol > MEETS_DRIVER) walk_fails(w, FLG_DAMAGED);
         if (i < 4) symbols[i] = symbol;
         chain = chain && symbol == MEETS_LEFT;
-        if (chain) left = w->edges[left].left;
+        if (chain && left != FLG_NONE) left = w->edges[left].left;
         if (left == at || (left != FLG_NONE && w->edges[left].from == FLG_NONE)) left = FLG_NONE;
         if (degree > 4 && (symbol == MEETS_NEW || symbol == MEETS_DRIVER) && w->status == FLG_OK) {
             uint32_t expected[3] = {0, 0, 0}; /* of large faces corner by corner, of others when all are known */
