@@ -108,14 +108,16 @@ def poses_of(context, high, frames):
 
 
 def turn_glb(path, matrix):
-    """Puts all nodes of a GLB under one with a matrix (4x4)."""
+    """Puts the nodes of a GLB under one with a matrix (4x4); skinned meshes stay above, as their joints move them."""
     with open(path, "rb") as file:
         data = file.read()
     length = struct.unpack_from("<I", data, 12)[0]
     gltf, rest = json.loads(data[20:20 + length]), data[20 + length:]
     for scene in gltf["scenes"]:
-        gltf["nodes"].append({"name": "Filigree", "children": scene["nodes"], "matrix": [float(x) for x in np.array(matrix).T.flat]})
-        scene["nodes"] = [len(gltf["nodes"]) - 1]
+        skinned = [node for node in scene["nodes"] if "skin" in gltf["nodes"][node]]
+        others = [node for node in scene["nodes"] if node not in skinned]
+        gltf["nodes"].append({"name": "Filigree", "children": others, "matrix": [float(x) for x in np.array(matrix).T.flat]})
+        scene["nodes"] = [len(gltf["nodes"]) - 1, *skinned]
     text = json.dumps(gltf, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     part = f"{path}.part"
