@@ -1,6 +1,7 @@
 #include "fleshing.h"
 
 #include "fitting.h"
+#include "softness.h"
 #include "words.h"
 
 #include <algorithm>
@@ -60,7 +61,10 @@ Result<State> fleshed_state(State state, const FleshSettings& settings, const Ru
     if (before->clip >= read->clips.size())
         return Error{ErrorCode::mismatch, "The file has changed since it was opened; open it again."};
     const std::array clips = {before->clip};
-    const Result<Flesh> flesh = Flesh::create(std::move(*read), options_of(settings), clips, context);
+    FleshOptions options = options_of(settings);
+    if (const auto softness = softness_of(state); softness && softness->size() == read->mesh.vertex_count())
+        options.loose = *softness;
+    const Result<Flesh> flesh = Flesh::create(std::move(*read), options, clips, context);
     if (!flesh) return flesh.error();
     FleshClipOptions how;
     how.loop = settings.loop;

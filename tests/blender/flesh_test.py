@@ -94,8 +94,6 @@ def test_a_group_says_where_it_is_soft():
     high = bending_tube()
     bpy.context.scene.filigree_flesh.soft_group = "belly"
     refused(bpy.ops.filigree.flesh, "no vertex group 'belly'")
-    if "loose" not in filigree.Flesh.__doc__:
-        return print("this module has no looseness by vertices")
     group = high.vertex_groups.new(name="belly")
     group.add([v.index for v in high.data.vertices], 1, "REPLACE")
     bpy.ops.filigree.flesh()
