@@ -54,6 +54,13 @@ PackedView packed_vertices(std::string_view raw, std::size_t stride) {
     return view;
 }
 
+std::string packed_triangles(std::span<const unsigned> indices, std::size_t vertices) {
+    std::string bytes(meshopt_encodeIndexBufferBound(indices.size(), vertices), '\0');
+    bytes.resize(meshopt_encodeIndexBuffer(reinterpret_cast<unsigned char*>(bytes.data()), bytes.size(), indices.data(),
+                                           indices.size()));
+    return bytes;
+}
+
 PackedView packed_indices(std::string_view raw, int component, bool are_triangles) {
     const std::size_t size = bytes_of_component(component);
     std::vector<unsigned> indices(raw.size() / size);
@@ -65,12 +72,18 @@ PackedView packed_indices(std::string_view raw, int component, bool are_triangle
     const std::size_t vertices = indices.empty() ? 0 : std::size_t{*std::ranges::max_element(indices)} + 1;
     PackedView view{{}, are_triangles ? "TRIANGLES" : "INDICES", size, indices.size()};
     meshopt_encodeIndexVersion(1);
-    view.bytes.resize(are_triangles ? meshopt_encodeIndexBufferBound(indices.size(), vertices)
-                                    : meshopt_encodeIndexSequenceBound(indices.size(), vertices));
-    auto* bytes = reinterpret_cast<unsigned char*>(view.bytes.data());
-    view.bytes.resize(are_triangles
-                          ? meshopt_encodeIndexBuffer(bytes, view.bytes.size(), indices.data(), indices.size())
-                          : meshopt_encodeIndexSequence(bytes, view.bytes.size(), indices.data(), indices.size()));
+    if (!are_triangles) {
+        view.bytes.resize(meshopt_encodeIndexSequenceBound(indices.size(), vertices));
+        view.bytes.resize(meshopt_encodeIndexSequence(reinterpret_cast<unsigned char*>(view.bytes.data()),
+                                                      view.bytes.size(), indices.data(), indices.size()));
+        return view;
+    }
+    // Neighbours that follow each other pack well; where the mesh has its triangles like that, they stay.
+    std::vector<unsigned> ordered(indices.size());
+    meshopt_optimizeVertexCacheStrip(ordered.data(), indices.data(), indices.size(), vertices);
+    view.bytes = packed_triangles(indices, vertices);
+    if (std::string other = packed_triangles(ordered, vertices); other.size() < view.bytes.size())
+        view.bytes = std::move(other);
     return view;
 }
 
