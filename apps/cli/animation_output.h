@@ -18,7 +18,7 @@ struct AnimationOutput {
     GlbMotion glb = GlbMotion::automatic;
     bool no_normals = false, compress = false;
     std::optional<double> key_error; ///< of SkinOptions
-    SkinOptions skin; ///< its normals as no_normals says
+    SkinOptions skin;                ///< its normals as no_normals says
     MorphOptions morph;
 };
 
