@@ -60,6 +60,14 @@ TEST(FollowCamera, MovesMoreEvenlyThanWhatItFollows) {
         EXPECT_LT((cameras[frame + 1].eye - 2 * cameras[frame].eye + cameras[frame - 1].eye).norm(), 2e-3 * size);
 }
 
+TEST(FollowCamera, FollowsInAFilmOfASecondToo) {
+    std::vector<std::vector<Vec3f>> points;
+    for (std::size_t frame = 0; frame < 60; ++frame) points.push_back(cube_at({0.3 * double(frame), 0, 0}, 1));
+    const std::vector<Camera> cameras = follow_cameras(points, options());
+    ASSERT_EQ(cameras.size(), 60U);
+    EXPECT_GT((cameras.back().eye - cameras.front().eye).norm(), 3);
+}
+
 TEST(FollowCamera, StandsStillWhereThatShowsAsMuch) {
     EXPECT_EQ(follow_cameras(bouncing(0.1), options()).size(), 1u);
     const std::vector<std::vector<Vec3f>> one = {cube_at({0, 0, 0}, 1)};

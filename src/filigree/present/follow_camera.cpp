@@ -9,6 +9,7 @@ namespace filigree {
 namespace {
 
 constexpr double kAhead = 0.75;  // s that a camera looks ahead and back
+constexpr double kPart = 0.375;  // of a short film that it looks ahead and back: else it would see all of it at once
 constexpr double kCloser = 1.35; // by so much the picture has to gain, else the camera stands still
 
 double distance_of(const Camera& camera) { return (camera.eye - camera.target).norm(); }
@@ -25,7 +26,8 @@ std::vector<Camera> follow_cameras(std::span<const std::vector<Vec3f>> points, c
                           options.aspect, options.field_of_view_deg);
     };
     const auto frames = std::ptrdiff_t(points.size());
-    const auto ahead = std::max<std::ptrdiff_t>(1, std::ptrdiff_t(std::lround(kAhead * options.frames_per_second)));
+    const auto ahead =
+        std::max<std::ptrdiff_t>(1, std::lround(std::min(kAhead * options.frames_per_second, kPart * double(frames))));
     const Camera still = fitted(0, frames - 1);
     if (frames == 1) return {still};
 

@@ -106,12 +106,14 @@ bool Renderer::Content::is_lit_later(const SceneObject& object) const {
     return targets.samples <= 1 && !object.drawable->content().point_count && look.surface && !look.edges;
 }
 
-/// Half of a solid's triangles need not be drawn: from outside, back faces lie behind front faces.
+/// Half of a solid's triangles need not be drawn: from outside, back faces lie behind front faces. Edges alone hide
+/// nothing.
 bool Renderer::Content::hides_back_faces(const SceneObject& object) const {
     const Drawable::Content& drawable = object.drawable->content();
     const bool is_inside = camera.field_of_view_deg > 0 && (camera.eye.array() >= drawable.box.min.array()).all() &&
                            (camera.eye.array() <= drawable.box.max.array()).all();
-    return drawable.is_solid && !drawable.is_turned_out && !object.appearance.clip && !is_inside;
+    return object.appearance.surface && drawable.is_solid && !drawable.is_turned_out && !object.appearance.clip &&
+           !is_inside;
 }
 
 /// Behind all that was seen, and in front of what was cleared.

@@ -284,8 +284,13 @@ std::vector<std::string> SceneRun::warnings() const {
     for (const StartOverlap& overlap : simulation_.start_overlaps()) {
         const SceneObstacle& obstacle = scene_->obstacles[overlap.obstacle];
         const std::string name = obstacle.mesh.empty() ? obstacle.shape : obstacle.mesh;
-        sentences.push_back(overlap.sentence(fmt::format("body '{}'", ready_->bodies[overlap.body].name),
-                                             fmt::format("obstacle '{}' (line {})", name, obstacle.line)));
+        const ReadyBody& body = ready_->bodies[overlap.body];
+        std::string sentence = overlap.sentence(fmt::format("body '{}'", body.name),
+                                                fmt::format("obstacle '{}' (line {})", name, obstacle.line));
+        if (!body.pieces.empty() && !overlap.is_inside)
+            sentence += fmt::format("; it breaks while it is pushed, and a frame of up to {} substeps may take minutes",
+                                    with_commas(kMostSubsteps));
+        sentences.push_back(sentence);
     }
     const auto add = [&](const std::string& sentence) {
         if (!sentence.empty()) sentences.push_back(sentence);
