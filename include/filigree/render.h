@@ -229,8 +229,9 @@ public:
                                     const RunContext& context = RunContext());
     static Result<Drawable> points(std::span<const Vec3f> positions, const Vec3d& origin,
                                    const PointOptions& options = {}, const RunContext& context = RunContext());
-    /// A level of a model; the vertex shader restores it. Normals belong to the rest shape and turn with the gradients.
-    /// It is at rest until set_pose. The model, and what the options point to, must outlive the drawable.
+    /// A level of a model; the vertex shader restores it, or the processor where that draws as well. Normals belong to
+    /// the rest shape and turn with the gradients. It is at rest until set_pose. The model, and what the options point
+    /// to, must outlive the drawable.
     static Result<Drawable> model(const Model& model, const RestoreOptions& restore, const SurfaceOptions& options = {},
                                   const RunContext& context = RunContext());
     Drawable(Drawable&&) noexcept;

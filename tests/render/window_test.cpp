@@ -329,7 +329,7 @@ TEST_F(InWindow, DrawablesArePreparedInAnyThread) {
     }).join();
     std::vector<Drawable> here;
     here.push_back(surface(mesh));
-    here.push_back(drawable_of(Drawable::model(model, {}, {}, kOneThread)));
+    here.push_back(drawable_of(Drawable::upload(*DrawData::model(model, {}, {}, RestoreOn::gpu, kOneThread))));
     here.push_back(surface(mesh));
     for (std::size_t i = 0; i < made.size(); ++i) {
         const Drawable there = drawable_of(Drawable::upload(std::move(made[i])));
