@@ -1,6 +1,7 @@
 # The page of `filigree export --web`: web/src and three.js as one script, and what goes beside it, in share/filigree/web
 # of the build tree and of the installed one. Without node or web/node_modules (scripts/setup fetches them) there is no
-# page, and the program says so when it is asked for one. Without clang for WebAssembly the page plays no streams.
+# page, and the program says so when it is asked for one. Without clang for WebAssembly the page plays no streams, and
+# there are no live pages.
 
 set(web ${PROJECT_SOURCE_DIR}/web)
 set(esbuild ${web}/node_modules/esbuild/bin/esbuild)

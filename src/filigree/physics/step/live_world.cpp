@@ -459,8 +459,8 @@ Result<std::string> write_live_world(const LiveWorld& live) {
     };
     for (const Actor& actor : live.actors) {
         if (actor.body->material.model == MaterialModel::mpm)
-            return Error{ErrorCode::unsuitable, "A body that melts or flows (model mpm) does not move in a page yet; "
-                                                "'filigree simulate' and 'export --web' show how it moved."};
+            return Error{ErrorCode::unsuitable,
+                         "A body of the model mpm (matter that melts and flows) does not move in a page."};
         take_body(actor.body);
         if (!actor.fracture) continue;
         take_body(actor.fracture->body->whole);
