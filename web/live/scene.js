@@ -106,7 +106,7 @@ export class LiveScene {
       start.scale(new THREE.Vector3(kPlaneReach * longest, kPlaneReach * longest, 1));
       mesh.matrix.copy(start);
     }
-    box.expandByVector(new THREE.Vector3(0.35 * longest, 0, 0.35 * longest));
+    box.expandByVector(new THREE.Vector3(0.2 * longest, 0, 0.2 * longest));
     box.max.y += 0.15 * longest;
     return box;
   }
