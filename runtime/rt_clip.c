@@ -2,8 +2,8 @@
 
 #include <string.h>
 
-void flg_clip_order(const flg_faces* faces, uint32_t corners, uint32_t vertices, uint32_t* vertex, uint32_t* beside,
-                    flg_key* keys, uint32_t* starts) {
+FLG_COLD void flg_clip_order(const flg_faces* faces, uint32_t corners, uint32_t vertices, uint32_t* vertex,
+                             uint32_t* beside, flg_key* keys, uint32_t* starts) {
     const uint32_t none = 0xffffffffu;
     size_t pairs = 0, at = 0;
     uint32_t known = 0;
@@ -40,7 +40,7 @@ void flg_clip_order(const flg_faces* faces, uint32_t corners, uint32_t vertices,
     }
 }
 
-static float read_real(flg_symbols* in) {
+static FLG_COLD float read_real(flg_symbols* in) {
     const uint32_t bits = flg_read_bits(in, 32);
     float value;
     memcpy(&value, &bits, sizeof value);
@@ -54,7 +54,7 @@ typedef struct flg_clip_scratch {
 
 size_t flg_clip_scratch_bytes(size_t all_numbers) { return sizeof(flg_clip_scratch) + all_numbers * sizeof(int32_t); }
 
-uint32_t flg_clip_frames(const void* stream, size_t size) {
+FLG_COLD uint32_t flg_clip_frames(const void* stream, size_t size) {
     flg_symbols in;
     flg_shares shares;
     uint32_t count;
@@ -64,8 +64,8 @@ uint32_t flg_clip_frames(const void* stream, size_t size) {
     return in.is_damaged || count > FLG_CLIP_FRAMES ? 0 : count;
 }
 
-int flg_read_clip(const void* stream, size_t size, uint32_t numbers, const uint32_t* vertex, const uint32_t* beside,
-                  uint32_t vertices, float* frames, void* scratch) {
+FLG_COLD int flg_read_clip(const void* stream, size_t size, uint32_t numbers, const uint32_t* vertex,
+                           const uint32_t* beside, uint32_t vertices, float* frames, void* scratch) {
     flg_clip_scratch* s = (flg_clip_scratch*)scratch;
     int32_t* steps = (int32_t*)(void*)(s + 1);
     const size_t all = (size_t)vertices * numbers;

@@ -16,14 +16,8 @@ typedef struct flg_coder {
 #endif
 } flg_coder;
 
-#if defined(__OPTIMIZE_SIZE__) || !defined(__GNUC__)
-#define FLG_HOT FLG_APART
-#else
-#define FLG_HOT FLG_INLINE
-#endif
-
 /* Each gives the value that is read, or writes `value`. */
-FLG_HOT uint32_t code_symbol(flg_coder* c, uint32_t context, uint32_t value) {
+FLG_APART uint32_t code_symbol(flg_coder* c, uint32_t context, uint32_t value) {
 #ifdef FLG_WITH_WRITER
     if (c->out) {
         c->out->symbol(c->out->user, context, value);
@@ -33,7 +27,7 @@ FLG_HOT uint32_t code_symbol(flg_coder* c, uint32_t context, uint32_t value) {
     (void)value;
     return flg_read_symbol(&c->in, c->shares + context);
 }
-FLG_HOT uint32_t code_number(flg_coder* c, uint32_t context, uint32_t value) {
+FLG_APART uint32_t code_number(flg_coder* c, uint32_t context, uint32_t value) {
 #ifdef FLG_WITH_WRITER
     if (c->out) {
         c->out->number(c->out->user, context, value);
@@ -54,7 +48,7 @@ FLG_APART uint32_t code_bits(flg_coder* c, uint32_t value, uint32_t count) {
     return flg_read_bits(&c->in, count);
 }
 /* value: what is to be added to what is expected, as an unsigned number that wraps around. */
-FLG_HOT uint32_t code_difference(flg_coder* c, uint32_t context, uint32_t value) {
+FLG_INLINE uint32_t code_difference(flg_coder* c, uint32_t context, uint32_t value) {
     return (uint32_t)flg_with_sign(code_number(c, context, flg_without_sign((int32_t)value)));
 }
 FLG_INLINE int is_writing(const flg_coder* c) {
@@ -284,7 +278,7 @@ FLG_INLINE uint32_t size_class(uint32_t a, uint32_t b, uint32_t c) {
 }
 
 /* The place of vertex v, from where it is expected. */
-FLG_INLINE void code_place(flg_walk* w, uint32_t v, const uint32_t expected[3], uint32_t context) {
+static void code_place(flg_walk* w, uint32_t v, const uint32_t expected[3], uint32_t context) {
     uint32_t *place = w->places + 3 * (size_t)v, off[3] = {0, 0, 0};
 #ifdef FLG_WITH_WRITER
     if (is_writing(&w->coder)) {
@@ -404,8 +398,8 @@ static void code_record(flg_walk* w, uint32_t v, uint32_t a, uint32_t b) {
 }
 
 /* A corner: how it is known, and its number; source: of the writer. */
-FLG_INLINE uint32_t code_corner(flg_walk* w, uint32_t context, uint32_t left, uint32_t right, uint32_t source,
-                                uint32_t* symbol) {
+static uint32_t code_corner(flg_walk* w, uint32_t context, uint32_t left, uint32_t right, uint32_t source,
+                            uint32_t* symbol) {
     uint32_t number = 0;
 #ifdef FLG_WITH_WRITER
     if (is_writing(&w->coder) && source != FLG_NONE) {
@@ -483,7 +477,7 @@ static void count_face(flg_walk* w, const uint32_t* corners, uint32_t count) {
 }
 
 /* How many corners the next face has; 0: none. */
-static uint32_t code_degree(flg_walk* w, uint32_t degree) {
+static FLG_COLD uint32_t code_degree(flg_walk* w, uint32_t degree) {
     uint32_t read;
     if (w->face_size > 0) return w->face_size;
     read = code_number(&w->coder, DEGREE, degree > 0 ? degree - 2 : 0);
@@ -520,7 +514,7 @@ static uint32_t source_corner(const flg_walk* w, uint32_t face, uint32_t degree,
 #endif
 
 /* A face that meets no known edge. */
-static void code_seed(flg_walk* w) {
+static FLG_COLD void code_seed(flg_walk* w) {
     uint32_t degree = 0, *corners = w->corners + w->done_corners;
 #ifdef FLG_WITH_WRITER
     uint32_t face = FLG_NONE, corner = 0;
@@ -562,8 +556,8 @@ static void code_seed(flg_walk* w) {
 }
 
 /* Where corner i of a face behind an edge is expected; i counts behind the edge. */
-FLG_INLINE void expect_place(const flg_walk* w, const flg_edge* gate, const uint32_t* corners, uint32_t degree,
-                             uint32_t i, int other_is_known, uint32_t expected[3]) {
+static void expect_place(const flg_walk* w, const flg_edge* gate, const uint32_t* corners, uint32_t degree, uint32_t i,
+                         int other_is_known, uint32_t expected[3]) {
     const uint32_t *b = w->places + 3 * (size_t)corners[0], *a = w->places + 3 * (size_t)corners[1],
                    *before = w->places + 3 * (size_t)gate->before, *after = w->places + 3 * (size_t)gate->after;
     for (int k = 0; k < 3; ++k) {
@@ -745,7 +739,7 @@ static void code_surface(flg_walk* w) {
     }
 }
 
-static int plane_edge(const uint32_t* cell, int k, uint64_t* key) {
+static FLG_COLD int plane_edge(const uint32_t* cell, int k, uint64_t* key) {
     /* behind u < 0 lies edge 0-2, behind v < 0 edge 0-1, behind the third edge 1-2 */
     static const unsigned char ends[3][2] = {{0, 2}, {0, 1}, {1, 2}};
     const uint64_t a = cell[ends[k][0]], b = cell[ends[k][1]];
@@ -753,7 +747,7 @@ static int plane_edge(const uint32_t* cell, int k, uint64_t* key) {
     return a != b;
 }
 
-static void make_planes(flg_walk* w) {
+static FLG_COLD void make_planes(flg_walk* w) {
     const uint32_t cells = w->sizes->cells;
     flg_key* keys = (flg_key*)take(w, 6 * (uint64_t)cells, sizeof(flg_key));
     size_t count = 0;
@@ -781,7 +775,7 @@ static void make_planes(flg_walk* w) {
 }
 
 /* Of the driver, then of the mesh. */
-static void code_model(flg_walk* w, uint32_t** driver_corners) {
+static FLG_COLD void code_model(flg_walk* w, uint32_t** driver_corners) {
     const flg_code_sizes* sizes = w->sizes;
     const int behind = (sizes->flags & FLG_CODE_DRIVER_BEHIND) != 0;
     uint32_t* driver;
@@ -862,11 +856,13 @@ typedef struct flg_valued {
     uint32_t base; /* of contexts */
 } flg_valued;
 
-static int is_of_corners(uint32_t kind) { return kind == FLG_VALUES_OF_CORNERS || kind == FLG_NORMALS_OF_CORNERS; }
+static FLG_COLD int is_of_corners(uint32_t kind) {
+    return kind == FLG_VALUES_OF_CORNERS || kind == FLG_NORMALS_OF_CORNERS;
+}
 
 /* The item `at`, expected between two others, which may be the same, or none. */
-static void code_item(flg_coder* c, const flg_valued* values, uint32_t at, uint32_t one, uint32_t other,
-                      const int32_t* source) {
+static FLG_COLD void code_item(flg_coder* c, const flg_valued* values, uint32_t at, uint32_t one, uint32_t other,
+                               const int32_t* source) {
     const uint32_t columns = values->of->columns;
     for (uint32_t k = 0; k < columns; ++k) {
         const uint32_t x = one == FLG_NONE ? 0 : (uint32_t)values->items[(size_t)one * columns + k],
@@ -879,8 +875,8 @@ static void code_item(flg_coder* c, const flg_valued* values, uint32_t at, uint3
 }
 
 /* source: the items to write. */
-static void code_vertex_values(flg_walk* w, const flg_valued* values, const flg_faces* faces, uint32_t corners,
-                               const int32_t* source) {
+static FLG_COLD void code_vertex_values(flg_walk* w, const flg_valued* values, const flg_faces* faces, uint32_t corners,
+                                        const int32_t* source) {
     const uint32_t vertices = (uint32_t)w->sizes->vertices, columns = values->of->columns;
     const int mixes = values->of->kind != FLG_WORDS_OF_VERTICES;
     unsigned char* known = (unsigned char*)take(w, vertices, 1);
@@ -905,8 +901,8 @@ static void code_vertex_values(flg_walk* w, const flg_valued* values, const flg_
 }
 
 /* item_of: of each corner, read or written; source_of: as the writer's items have it. */
-static void code_corner_values(flg_walk* w, const flg_valued* values, const flg_faces* faces, uint32_t* item_of,
-                               const int32_t* source, const uint32_t* source_of) {
+static FLG_COLD void code_corner_values(flg_walk* w, const flg_valued* values, const flg_faces* faces,
+                                        uint32_t* item_of, const int32_t* source, const uint32_t* source_of) {
     const uint32_t vertices = (uint32_t)w->sizes->vertices, count = values->of->count, columns = values->of->columns,
                    bits = flg_bits_to_name(count);
     uint32_t *last_at = (uint32_t*)take(w, vertices, sizeof(uint32_t)), *number = NULL, done = 0;
@@ -952,7 +948,7 @@ static void code_corner_values(flg_walk* w, const flg_valued* values, const flg_
     if (done != count) walk_fails(w, FLG_DAMAGED);
 }
 
-static void code_face_values(flg_walk* w, const flg_valued* values, const int32_t* source) {
+static FLG_COLD void code_face_values(flg_walk* w, const flg_valued* values, const int32_t* source) {
     int32_t last = 0;
     for (uint32_t f = 0; f < values->of->count; ++f) {
         const uint32_t changes = code_symbol(&w->coder, values->base, source ? source[f] != last : 0);
@@ -961,7 +957,7 @@ static void code_face_values(flg_walk* w, const flg_valued* values, const int32_
     }
 }
 
-static void unfold_normal(int32_t x, int32_t y, float n[3]) {
+static FLG_COLD void unfold_normal(int32_t x, int32_t y, float n[3]) {
     const double one = 1023;
     double p = (double)x / one, q = (double)y / one, z, length;
     n[0] = n[1] = n[2] = 0;
@@ -1008,7 +1004,7 @@ static FLG_COLD void add_number(flg_reading* r, const char* name, uint32_t value
 }
 
 /* The records of a chunk, block by block and by cell. */
-static void add_chunk(flg_reading* r, uint32_t k, uint32_t* starts) {
+static FLG_COLD void add_chunk(flg_reading* r, uint32_t k, uint32_t* starts) {
     enum { BLOCK = 1 << 15, CHUNK = 1 << 18 };
     flg_walk* w = &r->walk;
     const uint32_t first = k * CHUNK, left = w->vertices - first, count = left < CHUNK ? left : (uint32_t)CHUNK,
@@ -1103,7 +1099,9 @@ static FLG_COLD void begin_stream(flg_reading* r, const char* name, uint32_t con
     flg_symbols_begin(&w->coder.in, stream, (size_t)size);
 }
 
-static const char* corners_name(const flg_code_values* of) { return of->name[0] == 'u' ? "uv.cor" : "nrm.cor"; }
+static FLG_COLD const char* corners_name(const flg_code_values* of) {
+    return of->name[0] == 'u' ? "uv.cor" : "nrm.cor";
+}
 
 /* The k-th of the section "rt.att", whose stream follows those of the ones before. */
 static FLG_COLD void read_values(flg_reading* r, const flg_code_values* of, uint32_t k) {

@@ -31,7 +31,11 @@
 #if defined(__GNUC__)
 #define FLG_INLINE static inline __attribute__((always_inline))
 #define FLG_APART static __attribute__((noinline)) /* one copy of it is enough */
-#define FLG_COLD __attribute__((cold))             /* small rather than fast */
+#if defined(__clang__)
+#define FLG_COLD __attribute__((cold, minsize)) /* small rather than fast */
+#else
+#define FLG_COLD __attribute__((cold))
+#endif
 #define FLG_RESTRICT __restrict__
 #define FLG_PREFETCH(p) __builtin_prefetch(p)
 #else
