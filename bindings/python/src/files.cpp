@@ -61,14 +61,16 @@ py::dict pack_model_file(const PyModel& model, const fs::path& path, unsigned bi
                          const py::object& progress) {
     refuse_pipe(path);
     const PoseSequence sequence = poses.is_none() ? PoseSequence{} : poses_of(poses, 60);
-    enum class Profile { compact, stream, lossless };
-    const auto chosen = value_of<Profile>(
-        profile, "profile",
-        {{"compact", Profile::compact}, {"stream", Profile::stream}, {"lossless", Profile::lossless}});
+    enum class Profile { compact, stream, runtime, lossless };
+    const auto chosen = value_of<Profile>(profile, "profile",
+                                          {{"compact", Profile::compact},
+                                           {"stream", Profile::stream},
+                                           {"runtime", Profile::runtime},
+                                           {"lossless", Profile::lossless}});
     const PackReport report = LongCall{threads, progress}([&](const RunContext& context) {
         if (chosen == Profile::lossless)
             return PackReport{.bytes = pack_model_lossless(*model.model, sequence, path, context).value().bytes};
-        const PackOptions options{bits, surface, keep_order, chosen == Profile::stream};
+        const PackOptions options{bits, surface, keep_order, chosen == Profile::stream, chosen == Profile::runtime};
         return pack_model(*model.model, sequence, options, path, context).value();
     });
     const double diagonal = world_bounds(model.model->mesh).diagonal();
@@ -232,7 +234,8 @@ surface : bool
 keep_order : bool
     Vertices and faces come back in their order, at 20 to 50 bits a vertex.
 profile : str
-    'compact', the fewest bits; 'stream': coarse to fine, so that every beginning of the file is a mesh; 'lossless':
+    'compact', the fewest bits; 'stream': coarse to fine, so that every beginning of the file is a mesh; 'runtime': with
+    the bindings, for the C runtime and the npm package, without `surface` and `keep_order`; 'lossless':
     any model, levels included, and every number comes back bit for bit, whatever `bits`, `surface` and `keep_order`.
 poses : PoseSequence, array_like (f, d, 3), or sequence of Pose, optional
     As of `write_model`; packed too, 1e-5 of the diagonal off (rms).
