@@ -123,7 +123,8 @@ export class Model {
         const calls = this.#calls;
         const name = this.#take(8);
         new Uint8Array(calls.memory.buffer).set(new TextEncoder().encode("uv.val\0\0"), name);
-        const found = calls.flg_find_section(file, size, name, 0, room, room + 4, room + 8);
+        let found = calls.flg_find_decoded(this.#model, name, 0, room, room + 4, room + 8); // of a packed model
+        if (found !== 0) found = calls.flg_find_section(file, size, name, 0, room, room + 4, room + 8);
         calls.free(name);
         if (found !== 0) return null;
         const [at, bytes, count] = new Uint32Array(calls.memory.buffer, room, 3);
