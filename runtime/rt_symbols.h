@@ -8,6 +8,13 @@
 
 #include <string.h>
 
+/* libfiligree's inner headers read symbols inline, so its tests and programs need these functions too. */
+#if defined(FLG_WITH_WRITER) || defined(FLG_OF_LIBRARY)
+#define FLG_OFFERED
+#else
+#define FLG_OFFERED FLG_SHARED
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -29,8 +36,8 @@ typedef struct flg_shares {
     uint32_t pause, until_update;
 } flg_shares;
 
-FLG_SHARED void flg_shares_begin(flg_shares* shares);
-FLG_SHARED void flg_shares_update(flg_shares* shares);
+FLG_OFFERED void flg_shares_begin(flg_shares* shares);
+FLG_OFFERED void flg_shares_update(flg_shares* shares);
 
 FLG_INLINE void flg_shares_count(flg_shares* shares, uint32_t symbol) {
     shares->counts[symbol] += FLG_COUNT_STEP;
@@ -48,8 +55,8 @@ typedef struct flg_symbols {
     int is_damaged;
 } flg_symbols;
 
-FLG_SHARED void flg_symbols_begin(flg_symbols* in, const void* stream, size_t size);
-FLG_SHARED void flg_fetch_last_bits(flg_symbols* in, uint32_t count);
+FLG_OFFERED void flg_symbols_begin(flg_symbols* in, const void* stream, size_t size);
+FLG_OFFERED void flg_fetch_last_bits(flg_symbols* in, uint32_t count);
 
 /* States are this to 2^32 - 1. */
 static const uint32_t FLG_LOWEST_STATE = 1u << 16;
@@ -100,7 +107,7 @@ FLG_INLINE uint32_t flg_read_bits(flg_symbols* in, uint32_t count) {
 typedef struct flg_number_symbol {
     uint32_t first, bits;
 } flg_number_symbol;
-FLG_SHARED extern const flg_number_symbol flg_number_symbols[FLG_SYMBOLS];
+FLG_OFFERED extern const flg_number_symbol flg_number_symbols[FLG_SYMBOLS];
 
 FLG_INLINE uint32_t flg_read_number(flg_symbols* in, flg_shares* shares) {
     const flg_number_symbol of = flg_number_symbols[flg_read_symbol(in, shares)];

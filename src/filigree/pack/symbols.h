@@ -4,6 +4,7 @@
 // runtime's.
 #pragma once
 
+#define FLG_OF_LIBRARY
 #include "runtime/rt_symbols.h"
 
 #include <cstddef>
