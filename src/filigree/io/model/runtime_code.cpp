@@ -17,6 +17,8 @@ namespace {
 constexpr int kUvSteps = 4095, kColorSteps = 255, kNormalSteps = 1023;
 constexpr double kFarthestStep = 1 << 28;
 
+double squared_number(double x) { return x * x; }
+
 /// The faces around each vertex, so that the face on the other side of an edge is found.
 class FaceFinder {
 public:
@@ -309,7 +311,7 @@ std::uint32_t weight_bits_for(const Model& model, const PoseSequence& poses, dou
     }
     const double most = error / 3 * bounds(model.mesh).diagonal();
     std::uint32_t bits = kFewest; // a step rounds by its twelfth's root
-    while (bits < FLG_WEIGHT_BITS && squares / double(count) / 12 > std::pow(most * double(1u << bits), 2)) ++bits;
+    while (bits < FLG_WEIGHT_BITS && squares / double(count) / 12 > squared_number(most * double(1u << bits))) ++bits;
     return bits;
 }
 
@@ -418,7 +420,7 @@ Result<RuntimeCode> code_for_runtime(const Model& model, const PoseSequence& pos
         double off = 0;
         for (std::size_t k = 0; k < 3; ++k) {
             const float read = float(sizes.low[k] + sizes.step * places[3 * s + k]);
-            off += std::pow(double(read) - double(mesh.positions[s][Eigen::Index(k)]), 2);
+            off += squared_number(double(read) - double(mesh.positions[s][Eigen::Index(k)]));
         }
         squares += off;
         report.largest = std::max(report.largest, std::sqrt(off));
@@ -482,10 +484,9 @@ bool has_free_weights(const Model& model) {
             flg_closest_anchor(corner[0], corner[1], corner[2], point.data(), anchor);
             double moved = 0;
             for (std::size_t k = 0; k < 3; ++k)
-                moved += std::pow((1 - double(detail.u[r]) - double(detail.v[r])) * double(corner[0][k]) +
-                                      double(detail.u[r]) * double(corner[1][k]) +
-                                      double(detail.v[r]) * double(corner[2][k]) - double(anchor[k]),
-                                  2);
+                moved += squared_number((1 - double(detail.u[r]) - double(detail.v[r])) * double(corner[0][k]) +
+                                        double(detail.u[r]) * double(corner[1][k]) +
+                                        double(detail.v[r]) * double(corner[2][k]) - double(anchor[k]));
             off += moved > far * far;
         }
     return off * kFewOf > detail.order.size();
