@@ -5,6 +5,7 @@
 #include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/fem/cell_kernel.h"
 
+#include <algorithm>
 #include <random>
 
 namespace filigree {
@@ -48,15 +49,22 @@ inline void plain_forces(const ShakenBox& box, Vectors& result) {
             X[k] = Vec3f::Zero();
             for (unsigned c = 0; c < 8; ++c) X[k] += sign(k, c) * box.positions[corners[c]];
         }
-        float I = 0;
-        for (unsigned k = 1; k < 8; ++k) I += kappa[k] * X[k].squaredNorm() / (size * size);
+        float I = 0, I_bent = 0;
+        for (unsigned k = 1; k < 8; ++k) {
+            const float part = kappa[k] * X[k].squaredNorm() / (size * size);
+            I += part;
+            if (kappa[k] < 1) I_bent += part;
+        }
+        const float over = std::clamp(I_bent - cell_kernel::kBentFrom, 0.0f, cell_kernel::kBentMost);
+        const float bent = cell_kernel::kBentStiffness * over * over; // twice the slope of bent_energy
         const Vec3f cofactor[3] = {X[2].cross(X[4]), X[4].cross(X[1]), X[1].cross(X[2])};
         const float J = X[1].dot(cofactor[0]) / size3;
-        const float linear = body.cells.fraction[cell] * m.shear * (1 - 1 / (I + 1)) * h / 16;
+        const float shear = body.cells.fraction[cell] * m.shear * h / 16, linear = shear * (1 - 1 / (I + 1));
         const float volume = body.cells.fraction[cell] * m.bulk * (J - m.rest_ratio) / 64;
         for (unsigned c = 0; c < 8; ++c) {
             Vec3f gradient = Vec3f::Zero();
-            for (unsigned k = 1; k < 8; ++k) gradient += sign(k, c) * linear * kappa[k] * X[k];
+            for (unsigned k = 1; k < 8; ++k)
+                gradient += sign(k, c) * (linear + (kappa[k] < 1 ? shear * bent : 0)) * kappa[k] * X[k];
             for (unsigned axis = 0; axis < 3; ++axis) gradient += sign(1u << axis, c) * volume * cofactor[axis];
             result.add(corners[c], -gradient);
         }
