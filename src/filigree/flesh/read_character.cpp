@@ -40,7 +40,8 @@ MovingSurface surface_of(MeshAnimation animation, Mesh rest, std::string clip) {
 Result<SkinnedMesh> gltf_surface(GltfScene read, const std::string& name, std::size_t patches,
                                  const RunContext& context) {
     const auto scene = std::make_shared<const GltfScene>(std::move(read));
-    if (scene->animations().empty()) return nothing_moves(name, "has no skin and no animation, and so nothing moves; export it with its actions.");
+    if (scene->animations().empty())
+        return nothing_moves(name, "has no skin and no animation, and so nothing moves; export it with its actions.");
     MovingSurface surface{.rest = scene->mesh(), .clips = {}, .positions = {}, .samples_per_second = kOftenEnough};
     std::vector<double> begins;
     for (std::size_t a = 0; a < scene->animations().size(); ++a) {

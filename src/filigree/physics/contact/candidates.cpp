@@ -251,8 +251,7 @@ void Contacts::find_own(ContactPair& pair, const BodyState& body, float frame, c
     const OwnCells& own = *own_cells_[pair.points.number()];
     const Vectors positions = positions_in(body, ahead);
     const OwnCells::Folds folds = own.folds(positions, kFoldReach * pair.spacing, context);
-    const std::vector<Index> cells =
-        own.find(positions, folds, reach, passing_[pair.points.number()].get(), context);
+    const std::vector<Index> cells = own.find(positions, folds, reach, passing_[pair.points.number()].get(), context);
     Merge merge(pair);
     for (Index s = 0; s < cells.size(); ++s) merge_in_matter(merge, pair, body, s, {cells[s]});
 }
