@@ -4,6 +4,7 @@
 
 #include "filigree/fit.h"
 #include "filigree/flesh.h"
+#include "filigree/flesh/skin_map.h"
 #include "filigree/io/system/extension.h"
 #include "filigree/io/system/numbered_name.h"
 #include "filigree/mesh/mesh_map.h"
@@ -174,7 +175,7 @@ private:
         }
         if (!options_.soft_from.empty()) {
             const std::vector<double>& ends = options_.soft_values;
-            const Result<std::vector<float>> numbers = mesh_map(skin.mesh, options_.soft_from);
+            const Result<std::vector<float>> numbers = skin_map(skin, options_.soft_from);
             if (!numbers) throw Failure{{numbers.error().code, options_.input + ": " + numbers.error().message}};
             options.loose =
                 in_range(*numbers, ends.empty() ? std::array{0.0, 1.0} : std::array{ends[0], ends[1]}, {0, 1});
@@ -462,7 +463,7 @@ Command flesh_command() {
                     .named("PATTERN"),
                 Option("--soft-from", options->soft_from,
                        "Numbers of the mesh's vertices that say how loose it is: color.r (g, b, a), \"scalar NAME\", "
-                       "\"group NAME\", \"object NAME\" or \"material NAME\"")
+                       "\"group NAME\", \"object NAME\", \"material NAME\" or \"joint NAME\"")
                     .named("NUMBERS"),
                 Option("--soft-values", options->soft_values,
                        "Two of these numbers: where it holds as ever, and where it is loose (default: 0 1)")

@@ -1,6 +1,8 @@
 // Skins that become soft matter.
 #include "filigree/flesh.h"
 
+#include "filigree/flesh/skin_map.h"
+
 #include "flesh/made_skins.h"
 #include "threads.h"
 
@@ -142,6 +144,19 @@ TEST(Flesh, PaintedPlacesAreLoose) {
 }
 
 /// A limb that the animation drives through another passes where that is asked for.
+TEST(Flesh, JointsAreNumbersOfTheVertices) {
+    const SkinnedMesh skin = tube(8, 1, elbow(90, 1));
+    const std::vector<float> lower = skin_map(skin, "joint low*").value(), all = skin_map(skin, "joint upper").value();
+    for (std::size_t v = 0; v < lower.size(); ++v) {
+        const double x = skin.mesh.positions[v].x();
+        EXPECT_NEAR(lower[v], smooth((x + 0.1) / 0.2), 1e-6);
+        EXPECT_NEAR(all[v], 1, 1e-6); // the lower joint hangs below the upper one
+    }
+    EXPECT_EQ(skin_map(skin, "joint tail").error().message,
+              "The mesh has nothing for 'joint tail'; it has the joints upper, lower.");
+    EXPECT_EQ(skin_map(skin, "color.r").error().code, ErrorCode::unsuitable);
+}
+
 TEST(Flesh, LimbsPassThroughEachOtherWhereTheyShould) {
     const auto furthest = [](std::vector<JointContact> contacts) {
         SkinnedMesh skin;

@@ -145,6 +145,7 @@ TEST(MeshMap, TakesColoursScalarsAndLabels) {
     EXPECT_EQ(mesh_map(mesh, "group tail").error().message,
               "The mesh has nothing for 'group tail'; it has the groups left_arm, left_leg, head.");
     EXPECT_EQ(mesh_map(mesh, "object a").error().message, "The mesh has nothing for 'object a'; it has no objects.");
+    EXPECT_EQ(mesh_map(mesh, "joint tail").error().code, ErrorCode::unsuitable);
     EXPECT_EQ(mesh_map(mesh, "colour.r").error().code, ErrorCode::usage);
     EXPECT_EQ(in_range({1, 2, 3, 9}, {1, 3}, {10, 0.5}), (Values{10, 5.25f, 0.5f, 0.5f}));
     EXPECT_EQ(in_range({0, 1}, {1, 0}, {0.1, 1}), (Values{1, 0.1f})) << "the other way round";

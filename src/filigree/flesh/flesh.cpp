@@ -5,6 +5,7 @@
 #include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/flesh/inward_weights.h"
+#include "filigree/mesh/mesh_map.h"
 
 #include <algorithm>
 #include <cmath>
@@ -34,16 +35,6 @@ constexpr std::size_t kFarInSkeleton = 4, kFewestGlued = 4; ///< joints, edges o
 constexpr std::size_t kMostMoments = 120;                   ///< of a clip that are looked at for scales
 
 Error usage(std::string sentence) { return {ErrorCode::usage, std::move(sentence)}; }
-
-bool fits(std::string_view name, std::string_view pattern) {
-    if (pattern.empty()) return name.empty();
-    if (pattern[0] == '*') {
-        for (std::size_t skip = 0; skip <= name.size(); ++skip)
-            if (fits(name.substr(skip), pattern.substr(1))) return true;
-        return false;
-    }
-    return !name.empty() && (pattern[0] == '?' || pattern[0] == name[0]) && fits(name.substr(1), pattern.substr(1));
-}
 
 /// A line from one end to the other, m.
 struct Bone {
@@ -141,7 +132,7 @@ private:
         Index at = Index(joint);
         for (std::size_t steps = 0; at != kNoIndex && steps <= skin().joints.size(); ++steps) {
             for (std::size_t p = 0; p < patterns.size(); ++p)
-                if (fits(skin().joints[at].name, pattern(patterns[p]))) return p;
+                if (fits_pattern(skin().joints[at].name, pattern(patterns[p]))) return p;
             at = skin().joints[at].parent;
         }
         return patterns.size();

@@ -7,7 +7,7 @@ namespace filigree {
 namespace {
 
 constexpr std::string_view kChannels = "rgba", kColor = "color.";
-constexpr std::array<std::string_view, 4> kNamed = {"scalar", "group", "object", "material"};
+constexpr std::array<std::string_view, 5> kNamed = {"scalar", "group", "object", "material", "joint"};
 
 struct MapName {
     std::string_view kind, name;
@@ -71,8 +71,8 @@ std::string check_mesh_map(std::string_view from) {
     const bool is_named = std::ranges::find(kNamed, name.kind) != kNamed.end() && !name.name.empty();
     if (is_color || is_named) return "";
     return "'" + std::string(from) +
-           "' names no numbers of a mesh; write color.r (or g, b, a), scalar NAME, group NAME, object NAME or material "
-           "NAME";
+           "' names no numbers of a mesh; write color.r (or g, b, a), scalar NAME, group NAME, object NAME, material "
+           "NAME or joint NAME";
 }
 
 Result<std::vector<float>> mesh_map(const Mesh& mesh, std::string_view from) {
@@ -84,6 +84,8 @@ Result<std::vector<float>> mesh_map(const Mesh& mesh, std::string_view from) {
         return channel;
     }
     const MapName name = split_name(from);
+    if (name.kind == "joint")
+        return lacks(from, "no joints: those of a skin count where a body follows it, as [[follow]] and flesh make it");
     if (name.kind == "scalar") return scalar_map(mesh, from, name.name);
     return label_map(mesh,
                      name.kind == "group"    ? mesh.groups

@@ -176,7 +176,9 @@ const SceneKey kKeys[] = {
     key<&SceneMap::from>(
         "map", "from", "", kAnything,
         "numbers of the mesh's vertices: `\"color.r\"` (or g, b, a: 0 to 1), `\"scalar NAME\"`, or `\"group NAME\"`, "
-        "`\"object NAME\"`, `\"material NAME\"` (1 there, 0 elsewhere; `*` stands for any letters)",
+        "`\"object NAME\"`, `\"material NAME\"` (1 there, 0 elsewhere), or with [[follow]] `\"joint NAME\"` (how much "
+        "the "
+        "joint and those below it carry); `*` stands for any letters",
         "required"),
     key<&SceneMap::values>("map", "values", "", kAnything,
                            "two numbers of the mesh that get the ends of `range`; numbers beyond them get the same"),

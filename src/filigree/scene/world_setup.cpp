@@ -3,6 +3,7 @@
 #include "filigree/core/math.h"
 #include "filigree/file.h"
 #include "filigree/flesh.h"
+#include "filigree/flesh/skin_map.h"
 #include "filigree/fracture.h"
 #include "filigree/fracture/broken_model.h"
 #include "filigree/io/model/model_file.h"
@@ -166,7 +167,7 @@ private:
         hash_.add(mesh.positions);
         hash_.add(mesh.corners);
         BodyOptions options = from.body;
-        options.fields = fields_of(from, mesh);
+        options.fields = fields_of(from, [&](std::string_view name) { return mesh_map(mesh, name); });
         body.body = at_line(scene_, from.line, [&] {
             return std::make_shared<const Body>(
                 make_body(mesh, from.material, options, context_, &body.report).value());
@@ -237,13 +238,13 @@ private:
             if (from.body.cells.spacing > 0) options.spacing = from.body.cells.spacing;
             options.separate = from.body.separate;
             options.scale = from.body.size ? *from.body.size / bounds(skin.mesh).size().maxCoeff() : from.body.scale;
-            options.fields = fields_of(from, skin.mesh);
+            options.fields = fields_of(from, [&](std::string_view name) { return skin_map(skin, name); });
             options.gravity = math::matrix(from.rotation).transpose() * scene_.world.gravity;
             options.sculpted_gravity = follow.is_sculpted;
             for (const SceneFollowJoint& joint : follow.joints) options.soft.push_back(joint.soft);
             for (const SceneFollowContact& contact : follow.contacts) options.contacts.push_back(contact.limbs);
             if (!follow.loose_from.empty())
-                options.loose = in_range(mesh_map(skin.mesh, follow.loose_from).value(), follow.loose_values, {0, 1});
+                options.loose = in_range(skin_map(skin, follow.loose_from).value(), follow.loose_values, {0, 1});
             const std::array clips = {body.clip};
             return std::make_shared<const Flesh>(Flesh::create(std::move(skin), options, clips, context_).value());
         });
@@ -264,8 +265,8 @@ private:
         return body;
     }
 
-    /// What the maps say of a body by its mesh.
-    std::vector<VertexField> fields_of(const SceneBody& from, const Mesh& mesh) {
+    /// What the maps say of a body. numbers_called: those of its mesh.
+    std::vector<VertexField> fields_of(const SceneBody& from, const auto& numbers_called) {
         std::vector<VertexField> fields;
         const auto number = std::size_t(&from - scene_.bodies.data());
         for (const SceneMap& map : scene_.maps) {
@@ -273,7 +274,7 @@ private:
             VertexField& field = fields.emplace_back();
             field.of = map.of;
             field.values = at_line(scene_, map.line,
-                                   [&] { return in_range(mesh_map(mesh, map.from).value(), map.values, map.range); });
+                                   [&] { return in_range(numbers_called(map.from).value(), map.values, map.range); });
             hash_.add(field.values);
         }
         return fields;
