@@ -508,7 +508,8 @@ Scale cross-sections, from 1 at the near end to `factor`, above 0, at the far en
         py::arg("box"), py::arg("amplitude"), py::arg("seed") = 1, R"(smooth_random(box, amplitude, seed=1)
 --
 
-Smooth random displacement of up to `amplitude` times the box's diagonal. `box`: see `stretch`.
+Smooth random displacement of up to `amplitude` times the box's diagonal. Equal seeds give equal displacements: `seed`
+is a whole number, 0 or more. `box`: see `stretch`.
 )");
     m.def(
         "rbf",

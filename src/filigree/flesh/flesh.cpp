@@ -27,6 +27,7 @@ constexpr float kHeldStrength = 0.75f;         ///< of joints that hold their co
 constexpr float kFreeStrength = 0.1f;          ///< of joints that have no leash
 constexpr double kLeafReach = 1.5;             ///< times the way from a last joint to the middle of what it carries
 constexpr float kFolded = 0.3f, kWhole = 0.7f; ///< volume of a cell that the joints alone leave: from free to held
+constexpr float kInverted = 0.1f;              ///< volume of a cell at the start below which it is opened
 constexpr int kSettledRings = 2, kSettlingSteps = 60;
 constexpr float kThinDepth = 0.9f;                          ///< spacings
 constexpr int kThinReach = 3;                               ///< cells
@@ -625,7 +626,7 @@ Vectors Flesh::settled(const Vectors& targets) const {
     const auto is_near = [&](std::size_t c) {
         return std::ranges::any_of(cells[c], [&](Index corner) { return moves[corner]; });
     };
-    spread([&](std::size_t c) { return gradient(targets, c).determinant() < kWhole; });
+    spread([&](std::size_t c) { return gradient(targets, c).determinant() < kInverted; });
     Vectors at = targets;
     if (std::ranges::count(moves, 1) == 0) return at;
     for (int ring = 0; ring < kSettledRings; ++ring) spread(is_near);

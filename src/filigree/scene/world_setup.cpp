@@ -229,8 +229,9 @@ private:
         body.mesh_path = from.mesh;
         body.follow = follow;
         body.model = at_line(scene_, from.line, [&] { return model_of(from); });
+        SkinnedMesh skin = at_line(scene_, follow.line, [&] { return skin_of(follow, body.model.mesh, from.mesh); });
+        std::vector<VertexField> fields = fields_of(from, [&](std::string_view name) { return skin_map(skin, name); });
         body.flesh = at_line(scene_, follow.line, [&] {
-            SkinnedMesh skin = skin_of(follow, body.model.mesh, from.mesh);
             body.clip = clip_of(follow, skin);
             FleshOptions options = follow.flesh;
             options.material = from.material;
@@ -238,7 +239,7 @@ private:
             if (from.body.cells.spacing > 0) options.spacing = from.body.cells.spacing;
             options.separate = from.body.separate;
             options.scale = from.body.size ? *from.body.size / bounds(skin.mesh).size().maxCoeff() : from.body.scale;
-            options.fields = fields_of(from, [&](std::string_view name) { return skin_map(skin, name); });
+            options.fields = std::move(fields);
             options.gravity = math::matrix(from.rotation).transpose() * scene_.world.gravity;
             options.sculpted_gravity = follow.is_sculpted;
             for (const SceneFollowJoint& joint : follow.joints) options.soft.push_back(joint.soft);
