@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 std::string numbered_path(const std::string& path, const std::string& input) {
     std::error_code ignored;
     if (!path.ends_with('/') && !fs::is_directory(path_of(path), ignored)) return path;
-    return (path_of(path) / (path_of(input).stem().string() + "_####.ply")).string();
+    return (path_of(path) / path_of(path_of(input).stem().string() + "_####.ply")).string();
 }
 
 std::size_t bytes_of_file(const std::string& path) {
@@ -113,7 +113,7 @@ void write_numbered(const Restorer& restorer, const FrameSource<Pose>& poses, co
         return restorer.mesh(*pose, silent);
     };
     session.warn(require(write_numbered_meshes({poses.frames, poses.frames_per_second, mesh},
-                                               numbered_path(path, input), session.context())));
+                                               path_of(numbered_path(path, input)), session.context())));
 }
 
 } // namespace
@@ -181,7 +181,7 @@ void check_not_input(const std::string& output, const std::vector<std::string>& 
     for (const std::string& input : inputs)
         for (const fs::path& path : animation_files(path_of(input)))
             if (const auto file = file_of(path)) taken.insert(*file);
-    for (const fs::path& path : animation_files(numbered_path(output, inputs.front()))) {
+    for (const fs::path& path : animation_files(path_of(numbered_path(output, inputs.front())))) {
         const auto file = file_of(path);
         if (file && taken.contains(*file))
             refuse(path.string() + ": is the input and would be overwritten; choose another place with -o.");

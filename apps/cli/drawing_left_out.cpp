@@ -57,8 +57,8 @@ std::vector<BodyLook> looks_of_bodies(const ReadyScene& ready, Session& session)
 }
 
 bool is_film(const std::string& path) {
-    const std::string ending = lower_extension(path);
-    return ending == ".mp4" || ending == ".gif" || (ending == ".png" && printf_numbered_name(path));
+    const std::string ending = lower_extension(path_of(path));
+    return ending == ".mp4" || ending == ".gif" || (ending == ".png" && printf_numbered_name(path_of(path)));
 }
 
 struct SceneFilms::Films {};

@@ -47,8 +47,8 @@ struct FleshArguments {
     AnimationOutput animation;
 };
 
-bool is_glb(const std::string& path) { return lower_extension(path) == ".glb"; }
-bool is_fil(const std::string& path) { return lower_extension(path) == ".fil"; }
+bool is_glb(const std::string& path) { return lower_extension(path_of(path)) == ".glb"; }
+bool is_fil(const std::string& path) { return lower_extension(path_of(path)) == ".fil"; }
 
 void check_outputs(const FleshArguments& options, const Session& session) {
     for (std::size_t k = 0; k < options.outputs.size(); ++k) {
@@ -291,7 +291,8 @@ private:
             if (options_.keep_skeleton) skin.skeleton_of = path_of(options_.input);
             if (!skin.key_rate) skin.key_rate = kDefaultKeyRate;
             session_.begin_writing(path);
-            const ExportReport written = require(write_skin_glb(fitted_.model, named, skin, path, session_.context()));
+            const ExportReport written =
+                require(write_skin_glb(fitted_.model, named, skin, path_of(path), session_.context()));
             session_.warn(written.warnings);
             report_.add("file",
                         fmt::format("{}, {:.3g} MB: {} joints, {} clips, {} keys, error {:.1e} of the diagonal at them",

@@ -91,7 +91,7 @@ void fit_to_format(MeshFormat format, const Mesh& input, Mesh& mesh) {
 void write_folder(const FracturedMesh& fractured, const Mesh& input, const FractureArguments& options, Session& session,
                   Report& report) {
     const std::string extension = path_of(options.input).extension().string();
-    const MeshFormat format = require(mesh_format("piece" + extension));
+    const MeshFormat format = require(mesh_format(path_of("piece" + extension)));
     OutputFolder folder(path_of(options.output), path_of(options.input));
     std::vector<std::string> files;
     for (Index p = 0; p < fractured.pieces; ++p)

@@ -245,7 +245,7 @@ std::string job_of(const RestoreArguments& options) {
 /// here and there.
 std::optional<ModelChunks> chunks_in_file(const RestoreArguments& options, Session& session) {
     if (options.model == "-" || options.restore.level ||
-        animation_format(animation_place(options.output)).value() != AnimationFormat::pc2)
+        animation_format(path_of(animation_place(options.output))).value() != AnimationFormat::pc2)
         return {};
     Result<ModelChunks> chunks = ModelChunks::open(session.open_model(options.model), options.model, session.context());
     if (!chunks && chunks.error().code == ErrorCode::unsuitable) return {};

@@ -60,7 +60,8 @@ struct Outputs {
 std::string model_path(const std::string& path, std::size_t bodies, const std::string& body) {
     if (bodies == 1) return path;
     const fs::path whole = path_of(path);
-    return (whole.parent_path() / fmt::format("{}_{}{}", whole.stem().string(), body, whole.extension().string()))
+    return (whole.parent_path() /
+            path_of(fmt::format("{}_{}{}", whole.stem().string(), body, whole.extension().string())))
         .string();
 }
 

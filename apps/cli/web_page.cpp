@@ -169,7 +169,7 @@ void WebPage::write(Session& session) {
     std::error_code failed;
     const bool has_poster = !poster_.empty() && fs::exists(path_of(poster_), failed);
     const std::string page =
-        filled(require(read_file(parts_ / part_name(kind_, "index.html"))),
+        filled(require(read_file(parts_ / path_of(part_name(kind_, "index.html")))),
                {{"title", title_},
                 {"logo", logo_},
                 {"model", kind_ == WebModel::glb ? "glb" : "stream"},
@@ -181,12 +181,12 @@ void WebPage::write(Session& session) {
     require(write_file(path_of(index_), page));
     for (const std::string& file : {script_, style_, licenses_})
         require(write_file(path_of(file),
-                           require(read_file(parts_ / part_name(kind_, path_of(file).filename().string())))));
+                           require(read_file(parts_ / path_of(part_name(kind_, path_of(file).filename().string()))))));
     write_model_script(session);
 }
 
 void WebPage::write_model_script(Session& session) const {
-    std::ifstream model(model_, std::ios::binary);
+    std::ifstream model(path_of(model_), std::ios::binary);
     FileWriter script = require(FileWriter::create(path_of(model_script_)));
     std::string piece(kPieceBytes, '\0');
     while (model.read(piece.data(), std::streamsize(piece.size())), model.gcount() > 0) {

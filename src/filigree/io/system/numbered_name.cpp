@@ -1,4 +1,5 @@
 #include "filigree/io/system/numbered_name.h"
+#include "filigree/file.h"
 #include "filigree/io/system/text_scanner.h"
 
 #include <charconv>
@@ -20,7 +21,7 @@ NumberedName name_around(const fs::path& path, std::size_t begin, std::size_t en
 fs::path NumberedName::file(std::size_t number) const {
     std::string text = std::to_string(number);
     if (text.size() < digits) text.insert(0, digits - text.size(), '0');
-    return folder / (before + text + after);
+    return folder / path_of(before + text + after);
 }
 
 std::optional<std::uint64_t> NumberedName::number_of(const std::string& file) const {

@@ -170,7 +170,7 @@ int open_scratch(const Path& folder) {
     constexpr char kDigits[] = "0123456789abcdef";
     std::string name = ".filigree-";
     for (std::uint64_t bits = random_bits(), i = 0; i < 16; ++i, bits >>= 4) name += kDigits[bits & 15];
-    return open(folder / name, GENERIC_READ | GENERIC_WRITE, CREATE_NEW, FILE_FLAG_DELETE_ON_CLOSE);
+    return open(folder / native_name(name), GENERIC_READ | GENERIC_WRITE, CREATE_NEW, FILE_FLAG_DELETE_ON_CLOSE);
 }
 int duplicate(int descriptor) { return ::_dup(descriptor); }
 bool close(int descriptor) { return ::_close(descriptor) == 0; }

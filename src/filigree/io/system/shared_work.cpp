@@ -1,5 +1,6 @@
 #include "filigree/io/system/shared_work.h"
 
+#include "filigree/file.h"
 #include "filigree/io/system/file.h"
 #include "filigree/io/system/file_error.h"
 #include "filigree/io/system/platform.h"
@@ -48,8 +49,8 @@ Status check_chunk(const WorkChunk& chunk) {
 }
 
 SharedFolder::SharedFolder(fs::path path, std::string plan, std::function<bool()> is_in_place)
-    : path_(std::move(path)), folder_(path_.string() + ".chunks"), aside_(folder_.string() + ".done"),
-      finished_(path_.string() + ".plan"), plan_(std::move(plan)), is_in_place_(std::move(is_in_place)) {}
+    : path_(std::move(path)), folder_(path_of(path_.string() + ".chunks")), aside_(path_of(folder_.string() + ".done")),
+      finished_(path_of(path_.string() + ".plan")), plan_(std::move(plan)), is_in_place_(std::move(is_in_place)) {}
 
 bool SharedFolder::has_plan(const fs::path& file) const {
     const Result<std::string> there = read_file(file);
