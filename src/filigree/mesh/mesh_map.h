@@ -11,9 +11,9 @@ namespace filigree {
 std::string check_mesh_map(std::string_view from);
 
 /// One number a vertex. from: "color.r" (g, b, a), 0 to 1; "scalar NAME", as in the file; "group NAME", "object NAME"
-/// or "material NAME": the part of the faces around a vertex that is called so, in which * stands for any letters. "joint NAME" is for skin_map (flesh).
-/// Errors: usage (what check_mesh_map refuses), unsuitable (the mesh has no such thing: the sentence says what it has).
-/// Cost O(V + corners).
+/// or "material NAME": the part of the faces around a vertex that is called so, in which * stands for any letters.
+/// "joint NAME" is for skin_map (flesh). Errors: usage (what check_mesh_map refuses), unsuitable (the mesh has no such
+/// thing: the sentence says what it has). Cost O(V + corners).
 Result<std::vector<float>> mesh_map(const Mesh& mesh, std::string_view from);
 
 /// Numbers from `values` as numbers from `range`, straight in between; those beyond get the ends. values: not alike.
