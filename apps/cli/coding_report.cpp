@@ -15,7 +15,7 @@ void add_coding_shares(const PackedBytes& parts, std::size_t vertices, std::opti
     const auto bits = [&](std::uint64_t part) { return 8 * double(part) / double(std::max<std::size_t>(vertices, 1)); };
     const auto share = [&](const char* name, std::uint64_t part) {
         shares[name] = bits(part);
-        text += fmt::format("{}{:.2f} {}", text.empty() ? "" : ", ", bits(part), name);
+        if (part > 0) text += fmt::format("{}{:.2f} {}", text.empty() ? "" : ", ", bits(part), name);
     };
     if (bytes) shares["all"] = bits(*bytes);
     if (parts.levels > 0) {

@@ -4,12 +4,12 @@
 #include "web_page.h"
 
 #include "filigree/fit.h"
+#include "filigree/fit/packed_error.h"
 #include "filigree/io/animation/point_cache.h"
 #include "filigree/io/system/extension.h"
 #include "filigree/pack.h"
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 
 #include <fmt/format.h>
@@ -81,22 +81,6 @@ void check(const FitArguments& options, const Session& session) {
     check_animation_options(options.outputs, session);
 }
 
-/// Bits that round positions to a quarter of the error asked for, as far as there are so many.
-unsigned bits_for(double error, const Mesh& mesh) {
-    const Box box = world_bounds(mesh);
-    const double side = box.size().maxCoeff() / box.diagonal();
-    constexpr unsigned kFewest = 12, kMost = 16;
-    unsigned bits = kFewest;
-    while (bits < kMost && 0.5 * side / double((1u << bits) - 1) > error / 4) ++bits;
-    return bits;
-}
-
-/// What of the error is left for the fit once packing has taken its part: a quarter for places, a third for poses.
-constexpr double kShareOfPlaces = 0.25, kShareOfPoses = 1.0 / 3;
-double left_for_fit(double error) {
-    return error * std::sqrt(1 - kShareOfPlaces * kShareOfPlaces - kShareOfPoses * kShareOfPoses);
-}
-
 std::string error_text(double rms, double max, std::size_t frame, Index vertex) {
     return fmt::format("{:.2g} of the diagonal (rms), {:.2g} at most (frame {}, vertex {})", rms, max, frame + 1,
                        with_commas(vertex));
@@ -161,8 +145,8 @@ private:
         pack.levels = options_.profile == FitProfile::stream;
         pack.records = options_.profile == FitProfile::runtime || fitted_.report.has_free_weights;
         pack.keep_order = options_.keep_order;
-        pack.bits = options_.bits.value_or(bits_for(options_.fit.error, fitted_.model.mesh));
-        pack.clip_error = options_.fit.base ? pack.clip_error : kShareOfPoses * options_.fit.error;
+        pack.bits = options_.bits.value_or(bits_of_positions(options_.fit.error, fitted_.model.mesh));
+        pack.clip_error = options_.fit.base ? pack.clip_error : error_of_poses(options_.fit.error);
         const PackReport packed =
             require(pack_model(fitted_.model, fitted_.poses, pack, path_of(path), session_.context()));
         measure_packed(path, packed, pack, report);
@@ -253,7 +237,7 @@ void run(FitArguments options, Session& session) {
     const double start = now_seconds();
     FitOptions fit = options.fit;
     fit.weight_rounds = options.weight_rounds();
-    if (options.rounds() && !fit.base) fit.error = left_for_fit(fit.error);
+    if (options.rounds() && !fit.base) fit.error = error_of_fit(fit.error);
     const Fitted fitted = require(with_hint(fit_animation(input.animation, fit, session.context()), ErrorCode::mismatch,
                                             "--mesh and the animation belong to one object."));
     const double seconds = now_seconds() - start;

@@ -2,32 +2,17 @@
 
 #include "words.h"
 
+#include "filigree/fit/packed_error.h"
 #include "filigree/io/system/file.h"
 #include "filigree/pack.h"
 
 #include <QTemporaryDir>
 
 #include <algorithm>
-#include <cmath>
 
 namespace filigree::studio {
 
 namespace {
-
-// What packing may take of the error: of places a quarter, of poses a third.
-constexpr double kShareOfPlaces = 0.25, kShareOfPoses = 1.0 / 3;
-
-double left_for_fit(double error) {
-    return error * std::sqrt(1 - kShareOfPlaces * kShareOfPlaces - kShareOfPoses * kShareOfPoses);
-}
-
-/// Bits that round positions to that share of an error, as far as there are so many.
-unsigned bits_for(double error, const Mesh& mesh) {
-    constexpr unsigned kFewest = 12, kMost = 16;
-    const Box box = bounds(mesh.positions);
-    const double steps = 0.5 * box.size().maxCoeff() / box.diagonal() / (kShareOfPlaces * error);
-    return std::clamp(unsigned(std::ceil(std::log2(steps + 1))), kFewest, kMost);
-}
 
 std::size_t cache_bytes(const FitReport& report) { return report.frames * report.vertices * sizeof(Vec3f); }
 
@@ -43,8 +28,8 @@ Status pack(const Model& model, const PoseSequence& poses, const MeshAnimation& 
     const QTemporaryDir folder;
     const std::filesystem::path path = path_of(folder.filePath("fitted.fil").toStdString());
     PackOptions options;
-    options.bits = bits_for(error, model.mesh);
-    options.clip_error = kShareOfPoses * error;
+    options.bits = bits_of_positions(error, model.mesh);
+    options.clip_error = error_of_poses(error);
     const Result<PackReport> packed = pack_model(model, poses, options, path, context);
     if (!packed) return packed.error();
     Result<std::string> bytes = read_file(path);
@@ -89,7 +74,7 @@ Result<State> fitted_state(State state, double error, const RunContext& context)
                                          std::ranges::copy(original->frames[frame], positions.begin());
                                          return Success{};
                                      }};
-    Result<FittedMotion> fitted = fit_to(animation, {.error = left_for_fit(error)}, error, state, context);
+    Result<FittedMotion> fitted = fit_to(animation, {.error = error_of_fit(error)}, error, state, context);
     if (!fitted) return fitted.error();
     auto recording = std::make_shared<Recording>(*state.recording);
     recording->original = original;
