@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 namespace filigree {
@@ -101,6 +102,21 @@ TEST(BrokenBody, PiecesAreTheWhole) {
     EXPECT_NEAR(sum, energy, 1e-5 * energy);
 }
 
+/// A plane that leaves a sliver of a layer of cells on one side.
+Partition sliced_beside_cells() { return halves({0.0006, 0, 0}, {1, 0.02, 0.01}); }
+
+TEST(BrokenBody, NoCopyOfACellIsASliver) {
+    const auto whole = block(10, 3, 3, 0.1, brittle());
+    const auto broken = break_body(whole, sliced_beside_cells(), kTwoThreads).value();
+    std::vector<float> sum(whole->cells.cells.size(), 0);
+    for (std::size_t k = 0; k < broken->pieces.size(); ++k)
+        for (std::size_t c = 0; c < broken->cells_of_whole[k].size(); ++c) {
+            EXPECT_GE(broken->pieces[k]->cells.fraction[c], 0.999f * Cells::kLeastFraction);
+            sum[broken->cells_of_whole[k][c]] += broken->pieces[k]->cells.fraction[c];
+        }
+    for (const float fraction : sum) EXPECT_NEAR(fraction, 1, 1e-6);
+}
+
 /// A bar pulled at both ends at a constant speed.
 struct PulledBar {
     std::shared_ptr<const Body> body;
@@ -171,27 +187,33 @@ struct FlyingBlock {
     }
 };
 
+/// Over several places of the crack in its cells: at one of them the loss may be right by chance.
 TEST(Fracture, EnergyAndMomentum) {
-    for (const double energy : {5.0, 20.0, 60.0}) {
-        const FlyingBlock block(2);
-        Simulation simulation =
-            block.simulation(fracture_of(block.body, halves({0.02, 0, 0}, {1, 0.2, 0.1}), 1e4, energy));
-        const Energy start = simulation.energy(kTwoThreads);
-        const Momentum before = simulation.momentum();
-        for (int frame = 0; frame < 40; ++frame) {
-            ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
+    constexpr std::array kPlaces = {0.0, 0.02, 0.035, 0.05};
+    std::map<double, double> mean; // of the loss over what the crack takes, by energy
+    for (const double energy : {5.0, 20.0, 60.0})
+        for (const double place : kPlaces) {
+            const FlyingBlock block(2);
+            Simulation simulation =
+                block.simulation(fracture_of(block.body, halves({place, 0, 0}, {1, 0.2, 0.1}), 1e4, energy));
+            const Energy start = simulation.energy(kTwoThreads);
+            const Momentum before = simulation.momentum();
+            for (int frame = 0; frame < 40; ++frame) {
+                ASSERT_TRUE(simulation.advance(kTwoThreads).ok());
+            }
+            const FractureReport report = simulation.fracture(0);
+            EXPECT_EQ(report.parts, 2u);
+            EXPECT_NEAR(report.broken_area, report.crack_area, 1e-6);
+            EXPECT_NEAR(report.dissipated, energy * report.crack_area, 0.01 * energy * report.crack_area);
+            const double lost = start.total() - simulation.energy(kTwoThreads).total();
+            EXPECT_NEAR(lost, energy * report.crack_area, 0.2 * energy * report.crack_area) << energy << " " << place;
+            mean[energy] += lost / (energy * report.crack_area) / double(kPlaces.size());
+            const Momentum after = simulation.momentum();
+            const double size = before.linear.norm();
+            EXPECT_LT((after.linear - before.linear).norm(), 1e-6 * size);
+            EXPECT_LT((after.angular - before.angular).norm(), 1e-5 * size * 0.5);
         }
-        const FractureReport report = simulation.fracture(0);
-        EXPECT_EQ(report.parts, 2u);
-        EXPECT_NEAR(report.broken_area, report.crack_area, 1e-6);
-        EXPECT_NEAR(report.dissipated, energy * report.crack_area, 0.01 * energy * report.crack_area);
-        const double lost = start.total() - simulation.energy(kTwoThreads).total();
-        EXPECT_NEAR(lost, energy * report.crack_area, 0.1 * energy * report.crack_area);
-        const Momentum after = simulation.momentum();
-        const double size = before.linear.norm();
-        EXPECT_LT((after.linear - before.linear).norm(), 1e-6 * size);
-        EXPECT_LT((after.angular - before.angular).norm(), 1e-5 * size * 0.5);
-    }
+    for (const auto& [energy, share] : mean) EXPECT_NEAR(share, 1, 0.1) << energy;
 }
 
 std::vector<Vec3d> scattered_seeds(std::size_t count, double reach, std::uint64_t seed) {
@@ -303,6 +325,16 @@ TEST(Fracture, PiecesMoveInHardlyShorterSteps) {
     }
     EXPECT_GT(simulation.fracture(0).parts, 3u);
     EXPECT_LT(substeps, 2 * 40 * unbroken);
+}
+
+/// Copies of 0.001 of a cell were crushed by the recoil, and resisted that so stiffly that a frame took 699 substeps.
+TEST(Fracture, ASliverBesideACrackDoesNotSetThePace) {
+    const FlyingBlock block(30);
+    Simulation simulation = block.simulation(fracture_of(block.body, sliced_beside_cells(), 2e5, 20));
+    const unsigned unbroken = simulation.advance(kTwoThreads).value().substeps;
+    for (int frame = 1; frame < 20; ++frame)
+        EXPECT_LT(simulation.advance(kTwoThreads).value().substeps, 4 * unbroken) << frame;
+    EXPECT_EQ(simulation.fracture(0).parts, 2u);
 }
 
 TEST(Fracture, SavedInTheMiddleOfABreak) {

@@ -210,6 +210,24 @@ private:
         return Success{};
     }
 
+    /// What a piece has of a cell's fraction: by its samples, but kLeastFraction at least, or as much as the others
+    /// where the cell has less for each. A copy of less would be crushed by the corners beside it as soon as it lets
+    /// go, and then ask for substeps that nothing else needs. The fractions of all pieces sum to the cell's.
+    static float fraction_of(const Shares& shares, Index number, float fraction) {
+        if (shares.size() == 1) return fraction;
+        float all = 0;
+        for (const auto& [piece, samples] : shares) all += samples;
+        const float least = std::min(Cells::kLeastFraction, fraction / float(shares.size()));
+        const auto above = [&](float samples) { return std::max(fraction * (samples / all) - least, 0.0f); };
+        float own = 0, spare = 0;
+        for (const auto& [piece, samples] : shares) {
+            spare += above(samples);
+            if (piece == number) own = above(samples);
+        }
+        if (!(spare > 0)) return least;
+        return least + own * ((fraction - float(shares.size()) * least) / spare);
+    }
+
     /// Without its surface.
     Result<Body> make_piece(std::size_t k) {
         const Index number = result_.number_of_piece[k];
@@ -219,12 +237,7 @@ private:
         Cells cells = lattice_cells(std::move(indices), from.spacing, from.origin); // keeps their order
         for (std::size_t c = 0; c < result_.cells_of_whole[k].size(); ++c) {
             const Index of_whole = result_.cells_of_whole[k][c];
-            float own = 0, all = 0;
-            for (const auto& [piece, samples] : shares_[of_whole]) {
-                all += samples;
-                if (piece == number) own = samples;
-            }
-            cells.fraction[c] = from.fraction[of_whole] * (own / all);
+            cells.fraction[c] = fraction_of(shares_[of_whole], number, from.fraction[of_whole]);
         }
         Body body = bare_body(std::move(cells), whole_.material);
         body.scale = whole_.scale;

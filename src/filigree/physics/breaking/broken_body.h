@@ -30,8 +30,9 @@ struct CornerCopy {
     Index piece, corner;
 };
 
-/// Every cell of the whole body has a copy for each piece in it, with that piece's fraction of its mass and stiffness;
-/// so do its corners (virtual nodes [Molino 2004]). Tied together the copies are the whole body.
+/// Every cell of the whole body has a copy for each piece in it, with that piece's fraction of its mass and stiffness
+/// (kLeastFraction at least); so do its corners (virtual nodes [Molino 2004]). Tied together the copies are the whole
+/// body.
 struct BrokenBody {
     std::shared_ptr<const Body> whole;
     std::vector<std::shared_ptr<const Body>> pieces;  ///< those that have matter
