@@ -211,6 +211,7 @@ struct SceneFile {
     std::vector<SceneHand> hands;
     std::vector<SceneFollow> follows;
     ScenePicture picture;
+    std::vector<std::string> warnings; ///< sentences, with the line: words of older versions
 };
 
 /// A value that replaces one of the file, or a default.

@@ -52,6 +52,17 @@ TEST_F(SceneFileTest, RefusesWithLineAndSuggestion) {
               "3: 'size' in [[body]] must be a number, 1e-30 to 1e+30, and is 0.");
 }
 
+TEST_F(SceneFileTest, AWordOfOlderVersionsIsReadWithAWarning) {
+    const std::string mode = "[simulation]\nmode = \"descent\"\n" + kDrop.substr(kDrop.find("frames"));
+    const SceneFile scene = this->scene(mode);
+    EXPECT_EQ(scene.step.mode, StepMode::automatic);
+    ASSERT_EQ(scene.warnings.size(), 1U);
+    EXPECT_NE(scene.warnings[0].find(":2: mode 'descent' is a word of older versions; 'auto' takes its place"),
+              std::string::npos)
+        << scene.warnings[0];
+    EXPECT_TRUE(this->scene(kDrop).warnings.empty());
+}
+
 TEST_F(SceneFileTest, WhatCannotBreakIsToldWhatToWrite) {
     const std::string said = refusal("[[body]]\nname = \"statue\"\nshape = \"bar\"\nmaterial = \"stone\"\n"
                                      "[[fracture]]\npieces = 25\n");

@@ -5,6 +5,7 @@
 
 #include <filigree/physics/body/own_weight.h>
 #include <filigree/physics/grid/grid_limits.h>
+#include <filigree/scene/scene_keys.h>
 
 #include <cstdio>
 
@@ -71,6 +72,15 @@ std::vector<float> numbers_of(const py::object& given, const char* name) {
     return {array.data(), array.data() + array.size()};
 }
 
+/// A word of older versions counts as "auto", and a sentence says so.
+StepMode mode_of(const std::string& word, std::vector<std::string>& sentences) {
+    if (const std::string former = former_word_sentence(*find_key("simulation", "mode"), word); !former.empty()) {
+        sentences.push_back(former + ".");
+        return StepMode::automatic;
+    }
+    return value_of<StepMode>(word, "mode", {{"auto", StepMode::automatic}, {"explicit", StepMode::explicit_steps}});
+}
+
 SimulationPtr make_simulation(const py::object& bodies, const py::object& gravity,
                               const std::vector<Obstacle>& obstacles, const std::vector<Pin>& pins,
                               const std::vector<RegionForce>& forces, const std::vector<Hand>& hands,
@@ -102,13 +112,12 @@ SimulationPtr make_simulation(const py::object& bodies, const py::object& gravit
     world.body_restitution = restitution;
     StepOptions options;
     options.frames_per_second = frames_per_second;
-    options.mode =
-        value_of<StepMode>(mode, "mode", {{"auto", StepMode::automatic}, {"explicit", StepMode::explicit_steps}});
+    std::vector<std::string> sentences;
+    options.mode = mode_of(mode, sentences);
     options.most_substeps = most_substeps;
     options.contacts_between_bodies = contacts_between_bodies;
     options.contacts_within_bodies = contacts_within_bodies;
     options.automatic_rigid = automatic_rigid;
-    std::vector<std::string> sentences;
     for (std::size_t b = 0; b < actors.size(); ++b)
         if (const std::string weight = weight_warning(world, actors[b], b); !weight.empty())
             sentences.push_back(weight);

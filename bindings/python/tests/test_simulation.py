@@ -296,6 +296,17 @@ def said_by(work):
     return result, [str(warning.message) for warning in caught if issubclass(warning.category, filigree.FiligreeWarning)]
 
 
+def test_a_mode_of_older_versions_is_taken_with_a_warning():
+    body = filigree.Body(BAR, "jelly", particles=100)
+    with pytest.warns(filigree.FiligreeWarning, match="mode 'descent' is a word of older versions"):
+        old = filigree.Simulation([body], mode="descent")
+    new = filigree.Simulation([body], mode="auto")
+    old.step(), new.step()
+    assert (numpy.asarray(old.positions(0)) == numpy.asarray(new.positions(0))).all()
+    with pytest.raises(filigree.UsageError, match="'auto', 'explicit'"):
+        filigree.Simulation([body], mode="implicit")
+
+
 def test_a_body_has_a_size_or_a_scale():
     body = filigree.Body(BAR, "rubber", size=0.8, particles=100)
     assert body.scale == pytest.approx(0.8 / 4)

@@ -164,6 +164,7 @@ private:
         in.refuse_both("frames", "duration");
         in.read(&scene_);
         in.read(&scene_.step);
+        scene_.warnings = in.former_words();
         if (!scene_.duration) return;
         const double frames = std::round(*scene_.duration * scene_.step.frames_per_second);
         const double most = find_key("simulation", "frames")->values.most;

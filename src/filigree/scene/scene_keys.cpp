@@ -11,7 +11,9 @@ constexpr KeyValues kAnything = {};
 constexpr KeyValues kFile = {.is_file = true};
 constexpr KeyValues from(double least, double most) { return {.least = least, .most = most}; }
 constexpr KeyValues above(double least, double most) { return {.least = least, .most = most, .above = true}; }
-constexpr KeyValues one_of(std::string_view words) { return {.words = words}; }
+constexpr KeyValues one_of(std::string_view words, std::string_view former = "") {
+    return {.words = words, .former = former};
+}
 constexpr KeyUse shapes(std::string_view words) { return {.shapes = words}; }
 constexpr KeyUse models(std::string_view words) { return {.models = words}; }
 
@@ -45,7 +47,7 @@ const SceneKey kKeys[] = {
     key<&StepOptions::frames_per_second>("simulation", "frames_per_second", "1/s", from(10, 1e4),
                                          "frame rate of the output"),
     key<&StepOptions::mode>(
-        "simulation", "mode", "", one_of("auto explicit"),
+        "simulation", "mode", "", one_of("auto explicit", "descent"),
         "auto: a body that needs more than `most_substeps` becomes rigid; explicit: it stays elastic"),
     key<&StepOptions::most_substeps>(
         "simulation", "most_substeps", "", from(1, 1e5),
@@ -464,6 +466,13 @@ bool has_word(std::string_view words, std::string_view word) {
     bool found = false;
     each_word(words, [&](std::string_view each) { found = found || each == word; });
     return found;
+}
+
+std::string former_word_sentence(const SceneKey& key, std::string_view word) {
+    if (word.empty() || word != key.values.former) return "";
+    const std::string_view words = key.values.words;
+    return fmt::format("{} '{}' is a word of older versions; '{}' takes its place", key.name, word,
+                       words.substr(0, words.find(' ')));
 }
 
 std::string most_alike(std::string_view word, std::span<const std::string_view> words) {

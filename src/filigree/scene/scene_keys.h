@@ -29,6 +29,8 @@ struct KeyValues {
     bool above = false;          ///< `least` itself is not allowed
     std::string_view words = ""; ///< of a word, a space in between
     bool is_file = false;        ///< of a text: the name of a file, seen from the scene's folder
+    /// A word of older versions. It counts as the first of `words`, and a warning says so.
+    std::string_view former = "";
 };
 
 /// What a key belongs to; by default everything that its table may be.
@@ -73,6 +75,9 @@ void each_word(std::string_view words, const Visit& visit) {
     }
 }
 bool has_word(std::string_view words, std::string_view word);
+
+/// A sentence where the word is a former one of the key (KeyValues::former), without a full stop; "" where it is not.
+std::string former_word_sentence(const SceneKey& key, std::string_view word);
 
 /// What of a number is allowed, as words: "above 0", "0 to 1"; "" for anything.
 std::string range_text(const KeyValues& values);

@@ -206,6 +206,7 @@ private:
         std::vector<std::string_view> words;
         each_word(key_.values.words, [&](std::string_view word) { words.push_back(word); });
         const auto value = node.value_exact<std::string>();
+        if (value && !former_word_sentence(key_, *value).empty()) return 0;
         const auto found = std::ranges::find(words, value.value_or(""));
         if (found == words.end()) wrong(node, fmt::format("one of {}", fmt::join(words, ", ")));
         return static_cast<std::size_t>(found - words.begin());
@@ -338,6 +339,16 @@ void SceneTable::read(std::string_view name, SceneOwner owner) const {
     if (!node) return;
     const SceneKey& key = *find_key(name_, name);
     std::visit([&](auto* value) { KeyReader(path_, key).set(*node, *value); }, key.place(owner));
+}
+
+std::vector<std::string> SceneTable::former_words() const {
+    std::vector<std::string> sentences;
+    for (const auto& [name, value] : table_)
+        if (const auto word = value.value_exact<std::string>())
+            if (const std::string sentence = former_word_sentence(*find_key(name_, name.str()), *word);
+                !sentence.empty())
+                sentences.push_back(fmt::format("{}:{}: {}", path_, line(name.str()), sentence));
+    return sentences;
 }
 
 void SceneTable::refuse_both(std::string_view one, std::string_view other) const {

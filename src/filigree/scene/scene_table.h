@@ -37,6 +37,8 @@ public:
         for (std::size_t k = 0; entries && k < entries->size(); ++k)
             if (const toml::table* entry = entries->get_as<toml::table>(k)) read(SceneTable(path_, name, *entry));
     }
+    /// A sentence, with the line, for each word of an older version.
+    std::vector<std::string> former_words() const;
     void refuse_both(std::string_view one, std::string_view other) const;
     void refuse_two_regions() const; ///< box, ball and vertices
     /// Refuses keys of other shapes; shape: "mesh" or "shape" for bodies.

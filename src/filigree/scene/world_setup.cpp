@@ -74,6 +74,7 @@ public:
 
     ReadyScene build() {
         hash_.add(scene_.content);
+        for (const std::string& warning : scene_.warnings) warn(warning);
         result_.world = scene_.world;
         result_.bodies.reserve(scene_.bodies.size());
         for (const SceneBody& body : scene_.bodies) add_body(body);
