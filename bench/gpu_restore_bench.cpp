@@ -26,15 +26,15 @@ struct Scene {
     std::optional<GpuRestorer> restorer;
 };
 /// Kept from run to run; emptied while OpenGL is still there.
-std::map<std::pair<unsigned, Precision>, Scene> scenes;
+std::map<unsigned, Scene> scenes;
 
-const GpuRestorer& restorer_of(unsigned resolution, Precision precision) {
-    Scene& scene = scenes[{resolution, precision}];
+const GpuRestorer& restorer_of(unsigned resolution) {
+    Scene& scene = scenes[resolution];
     if (scene.restorer) return *scene.restorer;
     const RunContext context;
     Mesh mesh = make_wavy_cube({.resolution = resolution});
     const std::vector<Vec3f> normals = vertex_normals(mesh, mesh.positions, context);
-    scene.model = strip(std::move(mesh), {.base = 1000, .precision = precision}, context).value().model;
+    scene.model = strip(std::move(mesh), {.base = 1000}, context).value().model;
     std::vector<Index> vertices(scene.model.mesh.vertex_count());
     std::iota(vertices.begin(), vertices.end(), Index{0});
     scene.restorer.emplace(GpuRestorer::create(scene.model, vertices, normals, {}, context).value());
@@ -62,13 +62,12 @@ double seconds_each(auto&& body) {
 }
 
 void BM_gpu_restore(benchmark::State& state) {
-    const auto precision = static_cast<Precision>(state.range(1));
-    const bool captured = state.range(2) != 0;
-    const GpuRestorer& restorer = restorer_of(static_cast<unsigned>(state.range(0)), precision);
+    const bool captured = state.range(1) != 0;
+    const GpuRestorer& restorer = restorer_of(static_cast<unsigned>(state.range(0)));
     const std::size_t count = restorer.item_count();
 
     const gl::Program::Stage stage{
-        GL_VERTEX_SHADER, "#version 430 core\n" + GpuRestorer::shader_source(precision) +
+        GL_VERTEX_SHADER, "#version 430 core\n" + GpuRestorer::shader_source() +
                               (captured ? "out vec3 position, normal;\n"
                                           "void main() { restore_vertex(position, normal); }\n"
                                         : "void main() {\n"
@@ -79,7 +78,7 @@ void BM_gpu_restore(benchmark::State& state) {
     const char* const outputs[] = {"position", "normal"};
     const gl::Program program = gl::Program::link({&stage, 1}, std::span(outputs).first(captured ? 2 : 0));
 
-    const std::size_t record = (precision == Precision::int16 ? 12 : 24) + 4;
+    const std::size_t record = 24 + 4;
     const std::size_t bytes = count * (record + (captured ? 24 : 0)); // read and written
     const gl::Buffer results = gl::make_buffer(nullptr, captured ? count * 24 : 4).value();
     const std::vector<char> zeros(bytes / 2);
@@ -125,12 +124,11 @@ void BM_gpu_restore(benchmark::State& state) {
     state.counters["bytes/s"] = static_cast<double>(bytes) / best;
     state.counters["copy_bytes/s"] = static_cast<double>(bytes) / best_copy;
     state.counters["of_copy"] = best_copy / best;
-    state.SetLabel(std::to_string(count) + " vertices, " + (precision == Precision::int16 ? "int16" : "float") +
-                   (captured ? ", captured" : ", shaded"));
+    state.SetLabel(std::to_string(count) + " vertices, " + (captured ? "captured" : "shaded"));
 }
 BENCHMARK(BM_gpu_restore)
-    ->ArgNames({"resolution", "int16", "captured"})
-    ->ArgsProduct({{264, 707, 1291}, {0, 1}, {0, 1}})
+    ->ArgNames({"resolution", "captured"})
+    ->ArgsProduct({{264, 707, 1291}, {0, 1}})
     ->Iterations(20)
     ->UseManualTime()
     ->Unit(benchmark::kMillisecond);

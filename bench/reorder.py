@@ -51,7 +51,7 @@ def main():
             results = json.loads(run(program, "bench", "restore", "--mesh", mesh, "--threads", 1, "--json"))["results"]
             speeds.append({result["name"]: result["value"] for result in results})
         print(f"{'million vertices a second':44} {'shuffled':>9} {'renumbered':>11} {'ratio':>6}")
-        for what in ("float.in_mesh_order", "float.in_mesh_order.with_normals", "int16"):
+        for what in ("float.in_mesh_order", "float.in_mesh_order.with_normals"):
             before, after = (speed[f"restore.{what}"] / 1e6 for speed in speeds)
             print(f"{what:44} {before:9.0f} {after:11.0f} {after / before:6.2f}")
 

@@ -90,22 +90,18 @@ BENCHMARK(BM_restore_grids)
     ->Unit(benchmark::kMillisecond);
 
 /// A model of a wavy cube with 1,000 driver vertices.
-const Model& blend_model(unsigned resolution, Precision precision) {
-    static std::map<std::pair<unsigned, Precision>, Model> models;
-    const auto key = std::pair(resolution, precision);
-    if (!models.contains(key))
-        models.emplace(
-            key, strip(make_wavy_cube({.resolution = resolution}), {.base = 1000, .precision = precision}, RunContext())
-                     .value()
-                     .model);
-    return models.at(key);
+const Model& blend_model(unsigned resolution) {
+    static std::map<unsigned, Model> models;
+    if (!models.contains(resolution))
+        models.emplace(resolution,
+                       strip(make_wavy_cube({.resolution = resolution}), {.base = 1000}, RunContext()).value().model);
+    return models.at(resolution);
 }
 
 /// The blend code in record order, as a vertex buffer takes it, or in the mesh's own.
 void BM_restore_blend(benchmark::State& state) {
-    const auto precision = static_cast<Precision>(state.range(2));
-    const bool with_normals = state.range(3) == 1, in_order = state.range(3) == 2;
-    const Model& model = blend_model(static_cast<unsigned>(state.range(0)), precision);
+    const bool with_normals = state.range(2) == 1, in_order = state.range(2) == 2;
+    const Model& model = blend_model(static_cast<unsigned>(state.range(0)));
     const RunContext context(static_cast<unsigned>(state.range(1)));
     std::vector<BlendRestorer::Item> items(model.mesh.vertex_count());
     for (Index v = 0; v < items.size(); ++v) items[v] = {v, v};
@@ -127,21 +123,20 @@ void BM_restore_blend(benchmark::State& state) {
         }
     }
     const double points = static_cast<double>(items.size());
-    const double bytes =
-        points * ((precision == Precision::int16 ? 10 : 20) + 12 + (with_normals ? 24 : 0) + (in_order ? 4 : 0));
+    const double bytes = points * (20 + 12 + (with_normals ? 24 : 0) + (in_order ? 4 : 0));
     state.counters["vertices/s"] = points / best;
     state.counters["bytes/vertex"] = bytes / points;
     state.counters["bytes/s"] = bytes / best;
     state.counters["of_triad"] = bytes / best / (static_cast<double>(Triad::bytes(true)) / best_triad);
-    state.SetLabel(std::to_string(items.size()) + " vertices, " + (precision == Precision::int16 ? "int16" : "float") +
+    state.SetLabel(std::to_string(items.size()) + " vertices" +
                    (with_normals ? ", with normals"
                     : in_order   ? ", in the mesh's order"
                                  : ""));
 }
 BENCHMARK(BM_restore_blend)
-    ->ArgNames({"resolution", "threads", "int16", "extra"})
-    ->ArgsProduct({{128, 256, 512, 1290}, {1, 2}, {0, 1}, {0}})
-    ->ArgsProduct({{256}, {1, 2}, {0}, {1, 2}})
+    ->ArgNames({"resolution", "threads", "extra"})
+    ->ArgsProduct({{128, 256, 512, 1290}, {1, 2}, {0}})
+    ->ArgsProduct({{256}, {1, 2}, {1, 2}})
     ->MinTime(1)
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);

@@ -1,5 +1,5 @@
 // The C runtime beside the library, in one run: opening, poses, and restoring by every vector width.
-//   runtime [MODEL.fil...]      without a model: a wavy cube of 418,178 vertices, of floats and of int16
+//   runtime [MODEL.fil...]      without a model: a wavy cube of 418,178 vertices
 // Prints tables. Each figure is the best of many short calls, taken in turns: ratios count.
 #include "filigree/blend/blend_code.h"
 #include "filigree/blend/blend_kernel.h"
@@ -174,7 +174,5 @@ int main(int argc, char** argv) {
         measure(argv[k], {std::istreambuf_iterator<char>(file), {}});
     }
     if (argc > 1) return 0;
-    for (const Precision precision : {Precision::float32, Precision::int16})
-        measure(precision == Precision::int16 ? "wavy cube, int16" : "wavy cube, float",
-                write_model(strip(make_wavy_cube({.resolution = 264}), {.base = 1000, .precision = precision})->model));
+    measure("wavy cube", write_model(strip(make_wavy_cube({.resolution = 264}), {.base = 1000})->model));
 }

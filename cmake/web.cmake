@@ -30,7 +30,7 @@ if(FILIGREE_NODE AND bundler)
                  mesh/triangle_point)
       list(APPEND decoder_sources ${PROJECT_SOURCE_DIR}/src/filigree/${name}.cpp)
     endforeach()
-    foreach(name clip sort symbols) # the runtime's C compiles as C++, too
+    foreach(name base clip symbols) # the runtime's C compiles as C++, too
       list(APPEND decoder_sources ${PROJECT_SOURCE_DIR}/runtime/rt_${name}.c)
     endforeach()
     # As one source: the headers are read once.

@@ -7,7 +7,7 @@ using namespace filigree;
 
 int main() {
     const RunContext context;
-    const StripOptions options{.base = 500, .precision = Precision::int16};
+    const StripOptions options{.base = 500};
     const Model model = strip(make_wavy_sphere({.resolution = 64}), options, context).value().model;
     if (const Status written = write_model(model, "sphere.fil", context); !written) {
         std::fprintf(stderr, "%s\n", written.error().message.c_str());

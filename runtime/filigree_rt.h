@@ -42,7 +42,8 @@ typedef enum flg_status {
     FLG_UNSUITABLE = 5,  /* packed by another profile, with the reference code, or of a program before 0.1.0 */
     FLG_ARGUMENT = 6,    /* NULL, or a number that is out of its range */
     FLG_MISMATCH = 7,    /* another number of driver vertices than the model's */
-    FLG_MISSING = 8      /* the model has no such level, section, frame, normals or gradient fit */
+    FLG_MISSING = 8,     /* the model has no such level, section, frame, normals or gradient fit */
+    FLG_OLD_RECORDS = 9  /* the model has int16 records, of a program before 0.1.0: strip the mesh again */
 } flg_status;
 
 /* One sentence in English. Never NULL; lives as long as the program. */
@@ -79,7 +80,7 @@ typedef struct flg_options {
  * *model: the model, or NULL after an error.
  * Cost: O(size), and one system of 36 equations for each driver vertex. Memory: about 34 bytes a vertex, 12 more with
  * normals, 12 for each triangle, 1.3 KB for each driver vertex.
- * Errors: NOT_A_MODEL, DAMAGED, NEWER, UNSUITABLE, MISSING (no such level), ARGUMENT, NO_MEMORY. */
+ * Errors: NOT_A_MODEL, DAMAGED, NEWER, UNSUITABLE, OLD_RECORDS, MISSING (no such level), ARGUMENT, NO_MEMORY. */
 flg_status flg_open(const void* bytes, size_t size, const flg_options* options, flg_model** model);
 
 /* Gives the model's memory back. NULL is allowed. */
@@ -105,7 +106,6 @@ typedef struct flg_info {
     uint32_t parts;                 /* flg_restore_parts */
     uint32_t frames;                /* poses in the file */
     uint32_t frames_have_gradients; /* 0 or 1 */
-    uint32_t int16_records;         /* 0 or 1 */
     uint32_t has_fit;               /* 0 or 1 */
     uint32_t lanes;                 /* vertices at a time */
     double frames_per_second;       /* 0 without frames */

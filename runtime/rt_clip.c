@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#if FLG_HAS_PACKED
+
 FLG_COLD void flg_clip_order(const flg_faces* faces, uint32_t corners, uint32_t vertices, uint32_t* vertex,
                              uint32_t* beside, flg_key* keys, uint32_t* starts) {
     const uint32_t none = 0xffffffffu;
@@ -116,3 +118,5 @@ FLG_COLD int flg_read_clip(const void* stream, size_t size, uint32_t numbers, co
     }
     return 1;
 }
+
+#endif

@@ -4,7 +4,7 @@
 #ifndef FILIGREE_RT_CLIP_H
 #define FILIGREE_RT_CLIP_H
 
-#include "rt_sort.h"
+#include "rt_base.h"
 #include "rt_symbols.h"
 
 #ifdef __cplusplus

@@ -6,6 +6,8 @@
 #include <math.h>
 #include <string.h>
 
+#if FLG_HAS_PACKED
+
 /* ---- Symbols, read or written ---- */
 
 typedef struct flg_coder {
@@ -1003,15 +1005,22 @@ static FLG_COLD void add_number(flg_reading* r, const char* name, uint32_t value
     add_section(r, name, 0, 4, 1, item);
 }
 
+/* The records of all chunks, one behind another. */
+typedef struct flg_all_records {
+    uint32_t* starts; /* of cells, in a block */
+    uint16_t* from;
+    float *u, *v;
+} flg_all_records;
+
 /* The records of a chunk, block by block and by cell. */
-static FLG_COLD void add_chunk(flg_reading* r, uint32_t k, uint32_t* starts) {
+static FLG_COLD void add_chunk(flg_reading* r, uint32_t k, const flg_all_records* all) {
     enum { BLOCK = 1 << 15, CHUNK = 1 << 18 };
     flg_walk* w = &r->walk;
     const uint32_t first = k * CHUNK, left = w->vertices - first, count = left < CHUNK ? left : (uint32_t)CHUNK,
                    cells = w->sizes->cells;
-    uint32_t *runs = (uint32_t*)take(w, count, 8), run_count = 0;
-    uint16_t* from = (uint16_t*)take(w, count, 2);
-    float *u = (float*)take(w, count, 4), *v = (float*)take(w, count, 4);
+    uint32_t *runs = (uint32_t*)take(w, count, 8), *starts = all->starts, run_count = 0;
+    uint16_t* from = all->from + first;
+    float *u = all->u + first, *v = all->v + first;
     if (w->status != FLG_OK) return;
     for (uint32_t begin = 0; begin < count; begin += BLOCK) {
         const uint32_t end = count - begin < BLOCK ? count : begin + (uint32_t)BLOCK;
@@ -1046,8 +1055,12 @@ static FLG_COLD void add_model(flg_reading* r, uint32_t* driver_corners) {
     const flg_code_sizes* sizes = w->sizes;
     const int behind = (sizes->flags & FLG_CODE_DRIVER_BEHIND) != 0;
     uint64_t* vertices = (uint64_t*)take(w, 1, sizeof(uint64_t));
-    uint32_t *driver = (uint32_t*)take(w, sizes->driver_vertices, sizeof(uint32_t)),
-             *starts = (uint32_t*)take(w, sizes->cells, sizeof(uint32_t));
+    uint32_t* driver = (uint32_t*)take(w, sizes->driver_vertices, sizeof(uint32_t));
+    flg_all_records records;
+    records.starts = (uint32_t*)take(w, sizes->cells, sizeof(uint32_t));
+    records.from = (uint16_t*)take(w, sizes->vertices, 2);
+    records.u = (float*)take(w, sizes->vertices, 4);
+    records.v = (float*)take(w, sizes->vertices, 4);
     if (w->status != FLG_OK) return;
     *vertices = sizes->vertices;
     for (uint32_t i = 0; i < sizes->driver_vertices; ++i)
@@ -1066,7 +1079,7 @@ static FLG_COLD void add_model(flg_reading* r, uint32_t* driver_corners) {
     add_section(r, "lev.cor", 0, 4, 3 * (uint64_t)sizes->driver_faces, driver_corners);
     add_number(r, "bl.prec", 0);
     add_section(r, "bl.cell", 0, 12, sizes->cells, w->cells);
-    for (uint32_t k = 0; w->status == FLG_OK && (uint64_t)k << 18 < sizes->vertices; ++k) add_chunk(r, k, starts);
+    for (uint32_t k = 0; w->status == FLG_OK && (uint64_t)k << 18 < sizes->vertices; ++k) add_chunk(r, k, &records);
 }
 
 static FLG_COLD flg_status check_sizes(const flg_code_sizes* s, double most_bytes) {
@@ -1322,4 +1335,14 @@ flg_status flg_write_values(const flg_code_sizes* sizes, const flg_code_values* 
     }
     return w.status;
 }
+#endif
+
+#else
+
+flg_status flg_read_code(const flg_code_input* input, flg_plain_section** sections) {
+    (void)input;
+    *sections = NULL;
+    return FLG_UNSUITABLE;
+}
+
 #endif

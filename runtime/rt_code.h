@@ -5,7 +5,7 @@
 #define FILIGREE_RT_CODE_H
 
 #include "filigree_rt.h"
-#include "rt_sort.h"
+#include "rt_base.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -44,7 +44,7 @@ typedef struct flg_code_values {
     double low[4], step[4];
 } flg_code_values;
 
-/* A section of the plain model file. */
+/* A section of the plain model file. Sections in chunks lie one behind another, but for "bl.run". */
 typedef struct flg_plain_section {
     struct flg_plain_section* next;
     char name[8];

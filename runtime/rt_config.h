@@ -53,6 +53,19 @@
 #define FLG_SHARED
 #endif
 
+/* Parts that a program may leave out. FLG_NO_PACKED: packed models, which are then refused as unsuitable. FLG_NO_FIT:
+ * estimating gradients; every pose then needs them. */
+#if defined(FLG_NO_PACKED)
+#define FLG_HAS_PACKED 0
+#else
+#define FLG_HAS_PACKED 1
+#endif
+#if defined(FLG_NO_FIT)
+#define FLG_HAS_FIT 0
+#else
+#define FLG_HAS_FIT 1
+#endif
+
 /* Vector extensions, and a processor with vectors. FLG_NO_VECTORS: leave them out, one vertex at a time. */
 #if !defined(FLG_NO_VECTORS) && defined(__has_builtin)
 #if __has_builtin(__builtin_shufflevector) && __has_builtin(__builtin_convertvector) &&                                \

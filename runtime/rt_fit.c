@@ -5,8 +5,9 @@
 #include "rt_fit.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
+
+#if FLG_HAS_FIT
 
 enum {
     FLG_NEAR = 24, /* neighbours among all vertices */
@@ -76,74 +77,7 @@ struct flg_fit {
     float* normals;
 };
 
-static void* take_from_heap(void* user, size_t bytes) {
-    (void)user;
-    return malloc(bytes);
-}
-static void give_to_heap(void* user, void* memory) {
-    (void)user;
-    free(memory);
-}
-flg_allocator flg_default_allocator(void) {
-    flg_allocator heap;
-    heap.allocate = take_from_heap;
-    heap.release = give_to_heap;
-    heap.user = NULL;
-    return heap;
-}
-void* flg_allocate(const flg_allocator* from, uint64_t count, size_t item) {
-    if (count > (uint64_t)(PTRDIFF_MAX / 2) / item) return NULL;
-    return from->allocate(from->user, count > 0 ? (size_t)count * item : 1);
-}
-void flg_release(const flg_allocator* to, void* memory) {
-    if (memory) to->release(to->user, memory);
-}
-
 static double dot(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-static void cross(const double a[3], const double b[3], double out[3]) {
-    const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
-    out[0] = x;
-    out[1] = y;
-    out[2] = z;
-}
-
-/* ---- Normals ---- */
-
-/* Twice the area vector of a face, Newell's formula, from the first corner so that a small face far from the origin
- * keeps its digits. */
-static void doubled_area_vector(const float* positions, const uint32_t* corners, size_t count, double sum[3]) {
-    const float* first = positions + 3 * (size_t)corners[0];
-    double previous[3], current[3], turned[3];
-    for (int k = 0; k < 3; ++k) {
-        sum[k] = 0;
-        previous[k] = (double)positions[3 * (size_t)corners[1] + (size_t)k] - (double)first[k];
-    }
-    for (size_t i = 2; i < count; ++i) {
-        for (int k = 0; k < 3; ++k)
-            current[k] = (double)positions[3 * (size_t)corners[i] + (size_t)k] - (double)first[k];
-        cross(previous, current, turned);
-        for (int k = 0; k < 3; ++k) {
-            sum[k] += turned[k];
-            previous[k] = current[k];
-        }
-    }
-}
-
-void flg_vertex_normals(const float* positions, size_t count, const flg_faces* faces, double* sums, float* normals) {
-    memset(sums, 0, 3 * count * sizeof *sums);
-    for (size_t f = 0; f < faces->count; ++f) {
-        const size_t begin = faces->offsets ? faces->offsets[f] : 3 * f,
-                     end = faces->offsets ? faces->offsets[f + 1] : begin + 3;
-        double normal[3];
-        doubled_area_vector(positions, faces->corners + begin, end - begin, normal);
-        for (size_t c = begin; c < end; ++c)
-            for (size_t k = 0; k < 3; ++k) sums[3 * (size_t)faces->corners[c] + k] += normal[k];
-    }
-    for (size_t v = 0; v < count; ++v) {
-        const double *s = sums + 3 * v, length = sqrt(s[0] * s[0] + (s[1] * s[1] + s[2] * s[2]));
-        for (size_t k = 0; k < 3; ++k) normals[3 * v + k] = length > 0 ? (float)(s[k] / length) : 0;
-    }
-}
 
 /* ---- What is connected ---- */
 
@@ -896,7 +830,7 @@ static void unit_across(const double n[3], double across[3]) {
     const double x = fabs(n[0]), y = fabs(n[1]), z = fabs(n[2]);
     double axis[3] = {0, 0, 0}, length;
     axis[x <= y && x <= z ? 0 : y <= z ? 1 : 2] = 1;
-    cross(n, axis, across);
+    flg_cross(n, axis, across);
     length = sqrt(dot(across, across));
     for (int k = 0; k < 3; ++k) across[k] /= length;
 }
@@ -910,10 +844,10 @@ static void transform(const double a[9], const double x[3], double out[3]) {
 FLG_APART void with_normal_column(const double a[9], const double n[3], double out[9]) {
     double t[3], b[3], moved_t[3], moved_b[3], across[3], moved_n[3], area;
     unit_across(n, t);
-    cross(n, t, b);
+    flg_cross(n, t, b);
     transform(a, t, moved_t);
     transform(a, b, moved_b);
-    cross(moved_t, moved_b, across); /* the deformed normal; its length is the area ratio */
+    flg_cross(moved_t, moved_b, across); /* the deformed normal; its length is the area ratio */
     area = sqrt(dot(across, across));
     transform(a, n, moved_n);
     for (int row = 0; row < 3; ++row) {
@@ -934,7 +868,7 @@ FLG_APART void least_rotation(const double a[3], const double b[3], double out[9
         return;
     }
     w = sqrt((1 + cosine) / 2); /* a quaternion */
-    cross(a, b, v);
+    flg_cross(a, b, v);
     for (int k = 0; k < 3; ++k) v[k] /= 2 * w;
     for (int c = 0; c < 3; ++c) {
         const int d = (c + 1) % 3, e = (c + 2) % 3;
@@ -1004,4 +938,24 @@ void flg_fit_terms_of(const flg_fit* fit, uint32_t vertex, flg_fit_terms* out) {
     out->beside_line = flatness->beside_line;
     out->off_plane = flatness->off_plane;
 }
+#endif
+
+#else
+
+/* Nobody begins a fit: no model has one. */
+flg_fit* flg_fit_begin(const float* rest, uint32_t count, const flg_faces* faces, const flg_kernel* kernel,
+                       const flg_allocator* allocator) {
+    (void)rest, (void)count, (void)faces, (void)kernel, (void)allocator;
+    return NULL;
+}
+size_t flg_fit_scratch_bytes(uint32_t count) { return count; }
+void flg_fit_solve(flg_fit* fit, uint32_t begin, uint32_t end, void* scratch) {
+    (void)fit, (void)begin, (void)end, (void)scratch;
+}
+void flg_fit_end(flg_fit* fit) { (void)fit; }
+void flg_fit_free(flg_fit* fit) { (void)fit; }
+void flg_fit_gradients(const flg_fit* fit, const float* positions, uint32_t begin, uint32_t end, float* gradients) {
+    (void)fit, (void)positions, (void)begin, (void)end, (void)gradients;
+}
+
 #endif

@@ -2,24 +2,12 @@
 #ifndef FILIGREE_RT_FIT_H
 #define FILIGREE_RT_FIT_H
 
+#include "rt_base.h"
 #include "rt_kernel.h"
-#include "rt_sort.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-/* Where memory comes from. allocate gives NULL where there is none. */
-typedef struct flg_allocator {
-    void* (*allocate)(void* user, size_t bytes);
-    void (*release)(void* user, void* memory);
-    void* user;
-} flg_allocator;
-/* malloc and free */
-FLG_SHARED flg_allocator flg_default_allocator(void);
-/* count items of so many bytes. NULL: there is no memory, or the product is no size_t. */
-FLG_SHARED void* flg_allocate(const flg_allocator* from, uint64_t count, size_t item);
-FLG_SHARED void flg_release(const flg_allocator* to, void* memory);
 
 typedef struct flg_fit flg_fit;
 
@@ -51,11 +39,6 @@ typedef struct flg_fit_terms {
 } flg_fit_terms;
 FLG_SHARED void flg_fit_terms_of(const flg_fit* fit, uint32_t vertex, flg_fit_terms* terms);
 #endif
-
-/* Unit normals, 3 floats a vertex: the sum of its faces' area vectors; zero without a face of positive area. sums: 3
- * doubles a vertex of scratch memory. */
-FLG_SHARED void flg_vertex_normals(const float* positions, size_t count, const flg_faces* faces, double* sums,
-                                   float* normals);
 
 #ifdef __cplusplus
 }

@@ -176,10 +176,7 @@ void flg_make_transforms(const double* rest, double inner_scale, const float* po
             const double turned = (double)a[k] * h0 + ((double)a[3 + k] * h1 + (double)a[6 + k] * h2);
             to->t[k] = (float)(inner_scale * (double)p[k] - turned);
         }
-        to->half_rest[0] = (float)h0;
-        to->half_rest[1] = (float)h1;
-        to->half_rest[2] = (float)h2;
-        to->unused = 0;
+        memset(to->unused, 0, sizeof to->unused);
         memcpy(to->a, a, sizeof to->a);
     }
 }

@@ -12,8 +12,7 @@
 extern "C" {
 #endif
 
-/* What a driver vertex gives to every vertex it carries, in one cache line: t, the columns of A, and half its rest
- * position (which only int16 records need). */
+/* What a driver vertex gives to every vertex it carries, in one cache line: t and the columns of A. */
 typedef struct flg_transform {
 #ifdef __cplusplus
     alignas(64)
@@ -22,8 +21,7 @@ typedef struct flg_transform {
 #endif
         float t[3];
     float a[9];
-    float half_rest[3];
-    float unused;
+    float unused[4];
 } flg_transform;
 
 /* Records of one cell, end to end. */
@@ -39,16 +37,13 @@ enum {
                           * many points more than a block */
 };
 
-/* Everything that does not change from pose to pose; either q or offset is there. */
+/* Everything that does not change from pose to pose. */
 typedef struct flg_records {
     const flg_run* runs;
-    const uint32_t* cells;    /* 3 driver vertices each */
-    const float *u, *v;       /* float records */
-    const float* q[3];        /* float records: p - m / 2 */
-    const int16_t *u16, *v16; /* int16 records: 32767 is 1; NULL: float records */
-    const int16_t* offset[3]; /* int16 records: (p - m) / scale of the cell */
-    const float* scale;       /* int16 records: one a cell */
-    const float* normal[3];   /* unit rest normals, where they are wanted */
+    const uint32_t* cells;  /* 3 driver vertices each */
+    const float *u, *v;     /* weights of the cell's second and third corner */
+    const float* q[3];      /* p - m / 2 */
+    const float* normal[3]; /* unit rest normals, where they are wanted */
 } flg_records;
 
 /* What restored points are multiplied with, powers of two: positions, and normals before they get length one. */
@@ -131,20 +126,12 @@ FLG_INLINE void flg_anchor(const float* corner0, const float* corner1, const flo
         m[k] = (1 - u - v) * (double)corner0[k] + u * (double)corner1[k] + v * (double)corner2[k];
 }
 
-/* q of a float record: p - m / 2, relative to the centre and times inner_scale. */
+/* q of a record: p - m / 2, relative to the centre and times inner_scale. */
 FLG_INLINE void flg_rest_offset(const float p[3], const double m[3], const double centre[3], double inner_scale,
                                 float q[3]) {
     for (int k = 0; k < 3; ++k)
         q[k] = (float)(inner_scale * ((double)p[k] - centre[k]) - 0.5 * (inner_scale * (m[k] - centre[k])));
 }
-
-/* The position at rest that an int16 record says. */
-FLG_INLINE void flg_rest_of_steps(const double m[3], float scale, const int16_t steps[3], float p[3]) {
-    for (int k = 0; k < 3; ++k) p[k] = (float)(m[k] + (double)scale * (double)steps[k]);
-}
-
-/* A weight of an int16 record. */
-FLG_INLINE float flg_weight_of(int16_t steps) { return (float)steps * (1.0f / 32767.0f); }
 
 /* n with length 1; unchanged where that is 0. */
 FLG_SHARED void flg_unit(float n[3]);

@@ -10,7 +10,6 @@
 typedef float FLG_NAME(lanes_) __attribute__((vector_size(4 * FLG_N)));
 typedef float FLG_NAME(loose_) __attribute__((vector_size(4 * FLG_N), aligned(4), may_alias));
 typedef int32_t FLG_NAME(ints_) __attribute__((vector_size(4 * FLG_N)));
-typedef int16_t FLG_NAME(loose_shorts_) __attribute__((vector_size(2 * FLG_N), aligned(2), may_alias));
 #else
 typedef float FLG_NAME(lanes_);
 #endif
@@ -19,11 +18,9 @@ typedef float FLG_NAME(lanes_);
 #if FLG_N > 1
 #define FLG_LOAD(p) ((FLG_VEC) * (const FLG_NAME(loose_)*)(p))
 #define FLG_STORE(p, x) (*(FLG_NAME(loose_)*)(p) = (x))
-#define FLG_LOAD16(p) __builtin_convertvector(*(const FLG_NAME(loose_shorts_)*)(p), FLG_VEC)
 #else
 #define FLG_LOAD(p) (*(p))
 #define FLG_STORE(p, x) (*(p) = (x))
-#define FLG_LOAD16(p) ((float)*(p))
 #endif
 
 /* Stores x0 y0 z0 x1 y1 z1 ...: each third of the output takes its x and y in one shuffle and its z in a second. */
@@ -72,32 +69,19 @@ FLG_TARGET FLG_APART void FLG_NAME(set_cell_)(flg_cell* cell, const uint32_t* co
  * go to `normals` from `first` on. */
 FLG_HERE void FLG_NAME(restore_run_)(const flg_records* records, const flg_run* run, const flg_cell* cell,
                                      float* FLG_RESTRICT positions, flg_long_normals* FLG_RESTRICT normals,
-                                     size_t first, int int16, int with_positions, int with_normals) {
+                                     size_t first, int with_positions, int with_normals) {
     for (uint32_t k = 0; k < run->count; k += FLG_N) {
         const size_t r = (size_t)run->first + k;
-        FLG_VEC u, v, a[9];
-        if (int16) {
-            FLG_PREFETCH(records->u16 + r + FLG_AHEAD);
-            FLG_PREFETCH(records->v16 + r + FLG_AHEAD);
-            u = FLG_LOAD16(records->u16 + r) * (1.0f / 32767.0f);
-            v = FLG_LOAD16(records->v16 + r) * (1.0f / 32767.0f);
-        } else {
-            FLG_PREFETCH(records->u + r + FLG_AHEAD);
-            FLG_PREFETCH(records->v + r + FLG_AHEAD);
-            u = FLG_LOAD(records->u + r);
-            v = FLG_LOAD(records->v + r);
-        }
+        const FLG_VEC u = FLG_LOAD(records->u + r), v = FLG_LOAD(records->v + r);
+        FLG_VEC a[9];
+        FLG_PREFETCH(records->u + r + FLG_AHEAD);
+        FLG_PREFETCH(records->v + r + FLG_AHEAD);
         for (int i = 0; i < 9; ++i) a[i] = FLG_BLEND(3 + i);
         if (with_positions) {
             FLG_VEC q[3], p[3];
             for (int i = 0; i < 3; ++i) {
-                if (int16) {
-                    FLG_PREFETCH(records->offset[i] + r + FLG_AHEAD);
-                    q[i] = FLG_LOAD16(records->offset[i] + r) * records->scale[run->cell] + FLG_BLEND(12 + i);
-                } else {
-                    FLG_PREFETCH(records->q[i] + r + FLG_AHEAD);
-                    q[i] = FLG_LOAD(records->q[i] + r);
-                }
+                FLG_PREFETCH(records->q[i] + r + FLG_AHEAD);
+                q[i] = FLG_LOAD(records->q[i] + r);
             }
             for (int i = 0; i < 3; ++i) p[i] = FLG_BLEND(i) + (a[i] * q[0] + a[3 + i] * q[1] + a[6 + i] * q[2]);
             FLG_NAME(store_points_)(positions + 3 * k, p[0], p[1], p[2]);
@@ -159,7 +143,7 @@ FLG_TARGET FLG_APART void FLG_NAME(store_unit_)(const flg_long_normals* normals,
 
 FLG_HERE void FLG_NAME(restore_some_)(const flg_records* records, const flg_transform* transforms, flg_scales scales,
                                       size_t run_begin, size_t run_end, flg_place positions, flg_place normals,
-                                      int int16, int with_positions, int with_normals) {
+                                      int with_positions, int with_normals) {
     flg_long_normals long_normals;
     float last[3 * (FLG_MAX_RUN + FLG_PADDING)];
     flg_cell cell;
@@ -171,7 +155,7 @@ FLG_HERE void FLG_NAME(restore_some_)(const flg_records* records, const flg_tran
             FLG_NAME(set_cell_)(&cell, records->cells + 3 * (size_t)run->cell, transforms);
             const int fits = !with_positions || count + run->count + FLG_N - 1 <= positions.room;
             float* const to = with_positions && fits ? positions.points + 3 * count : last;
-            FLG_NAME(restore_run_)(records, run, &cell, to, &long_normals, count, int16, with_positions, with_normals);
+            FLG_NAME(restore_run_)(records, run, &cell, to, &long_normals, count, with_positions, with_normals);
             if (!fits) memcpy(positions.points + 3 * count, last, run->count * 3 * sizeof(float));
             count += run->count;
         }
@@ -191,22 +175,10 @@ FLG_HERE void FLG_NAME(restore_some_)(const flg_records* records, const flg_tran
 FLG_TARGET static void FLG_NAME(restore_runs_)(const flg_records* records, const flg_transform* transforms,
                                                flg_scales scales, size_t run_begin, size_t run_end, flg_place positions,
                                                flg_place normals) {
-#define FLG_SOME(int16, with_positions, with_normals)                                                                  \
-    FLG_NAME(restore_some_)                                                                                            \
-    (records, transforms, scales, run_begin, run_end, positions, normals, int16, with_positions, with_normals)
-    if (normals.points) { /* without positions where corners have normals of their own: not worth a loop of its own */
-        const int with_positions = positions.points != NULL;
-        if (records->u16)
-            FLG_SOME(1, with_positions, 1);
-        else
-            FLG_SOME(0, with_positions, 1);
-    } else {
-        if (records->u16)
-            FLG_SOME(1, 1, 0);
-        else
-            FLG_SOME(0, 1, 0);
-    }
-#undef FLG_SOME
+    if (normals.points) /* without positions where corners have normals of their own: not worth a loop of its own */
+        FLG_NAME(restore_some_)
+    (records, transforms, scales, run_begin, run_end, positions, normals, positions.points != NULL, 1);
+    else FLG_NAME(restore_some_)(records, transforms, scales, run_begin, run_end, positions, normals, 1, 0);
 }
 
 FLG_TARGET static void FLG_NAME(subtract_row_)(double* FLG_RESTRICT to, const double* FLG_RESTRICT from, double factor,
@@ -263,7 +235,6 @@ static const flg_kernel FLG_NAME(kernel_) = {FLG_N, FLG_NAME(restore_runs_), FLG
 #undef FLG_VEC
 #undef FLG_LOAD
 #undef FLG_STORE
-#undef FLG_LOAD16
 #undef FLG_EACH
 #undef FLG_POINT
 #undef FLG_AXIS

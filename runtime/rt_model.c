@@ -49,7 +49,6 @@ struct flg_model {
     uint64_t table_hash;
     int checks_hashes;
     uint32_t* cells;
-    float* scales;
     float* driver_rest;
     double* inner_rest; /* relative to the centre and scaled */
     double inner_scale, centre[3];
@@ -70,6 +69,7 @@ static const char* const status_texts[] = {
     "An argument is NULL or out of its range.",
     "The pose has another number of driver vertices than the model.",
     "The model does not have what is asked for.",
+    "The model has int16 records, which are no longer read: strip the mesh again, and pack it for the runtime.",
 };
 
 const char* flg_status_text(flg_status status) {
@@ -181,11 +181,10 @@ typedef struct flg_opening {
     uint32_t flags;
     flg_status status;
     uint32_t all_vertices;         /* in the file: with those of a driver behind the mesh's own */
-    float* positions;              /* of all vertices, at rest */
+    const float* positions;        /* of all vertices, at rest */
     uint32_t* record_of;           /* of each vertex: its record in the file's order */
     uint32_t *vertex_of, *cell_of; /* of each record */
-    float *u, *v;                  /* float records, in the file's order */
-    int16_t *u16, *v16, *steps;    /* int16 records; 3 steps each */
+    const float *u, *v;            /* weights, in the file's order */
     flg_faces faces;               /* of the level that is opened */
     uint32_t corner_count;
 } flg_opening;
@@ -283,13 +282,13 @@ static FLG_COLD uint32_t in_chunk(uint32_t vertices, uint32_t chunk) {
     return vertices - first < FLG_CHUNK ? (uint32_t)(vertices - first) : (uint32_t)FLG_CHUNK;
 }
 
-/* A section in chunks, one item a vertex; *items NULL where the first chunk is missing and that is allowed. */
-static FLG_COLD void* read_chunks(flg_opening* o, const char* name, uint32_t item, int may_be_missing) {
+/* A section in chunks, one item a vertex, to be read alone. */
+static FLG_COLD const void* read_chunks(flg_opening* o, const char* name, uint32_t item) {
     const uint32_t chunks = chunk_count(o->all_vertices);
     char* items;
-    if (may_be_missing && section_count(o, name, 0, item) == 0) return NULL;
     for (uint32_t k = 0; k < chunks && o->status == FLG_OK; ++k) /* before there is memory for so many */
         needs(o, section_count(o, name, k, item) == in_chunk(o->all_vertices, k));
+    if (find_decoded(o->decoded, name, 0)) return o->status == FLG_OK ? find_decoded(o->decoded, name, 0)->items : NULL;
     items = (char*)borrow(o, o->all_vertices, item);
     for (uint32_t k = 0; k < chunks && o->status == FLG_OK; ++k)
         copy_section(o, name, k, items + (size_t)k * FLG_CHUNK * item);
@@ -406,27 +405,13 @@ static FLG_COLD void read_driver(flg_opening* o, uint32_t* cell_count) {
     copy_section(o, "bl.cell", 0, model->cells);
     for (uint64_t k = 0; k < 3 * cells; ++k)
         if (!needs(o, model->cells[k] < count)) return;
-    if (model->info.int16_records) {
-        if (!needs(o, section_count(o, "bl.scale", 0, 4) == cells)) return;
-        model->scales = (float*)keep(o, cells, 4);
-        if (!model->scales) return;
-        copy_section(o, "bl.scale", 0, model->scales);
-        needs(o, all_finite(model->scales, cells));
-    }
     *cell_count = (uint32_t)cells;
     model->driver_rest = (float*)keep(o, count, 3 * sizeof(float));
     if (!model->driver_rest) return;
-    /* Float models hold every position, int16 models the driver's alone. */
-    if (section_count(o, "drv.pos", 0, 12) > 0) {
-        if (!needs(o, section_count(o, "drv.pos", 0, 12) == count && model->info.int16_records)) return;
-        copy_section(o, "drv.pos", 0, model->driver_rest);
-    } else {
-        o->positions = (float*)read_chunks(o, "mesh.pos", 12, 0);
-        if (!o->positions || !needs(o, all_finite(o->positions, 3 * (uint64_t)o->all_vertices))) return;
-        for (uint64_t i = 0; i < count; ++i)
-            memcpy(model->driver_rest + 3 * i, o->positions + 3 * (size_t)vertices[i], 3 * sizeof(float));
-    }
-    needs(o, all_finite(model->driver_rest, 3 * count));
+    o->positions = (const float*)read_chunks(o, "mesh.pos", 12);
+    if (!o->positions || !needs(o, all_finite(o->positions, 3 * (uint64_t)o->all_vertices))) return;
+    for (uint64_t i = 0; i < count; ++i)
+        memcpy(model->driver_rest + 3 * i, o->positions + 3 * (size_t)vertices[i], 3 * sizeof(float));
 }
 
 /* ---- Records ---- */
@@ -455,7 +440,7 @@ static FLG_COLD void read_runs(flg_opening* o, uint32_t cells) {
 
 /* Which record is whose. */
 static FLG_COLD void read_order(flg_opening* o) {
-    const uint16_t* from = (const uint16_t*)read_chunks(o, "bl.from", 2, 0);
+    const uint16_t* from = (const uint16_t*)read_chunks(o, "bl.from", 2);
     o->record_of = (uint32_t*)borrow(o, o->all_vertices, 4);
     o->vertex_of = (uint32_t*)borrow(o, o->all_vertices, 4);
     if (o->status != FLG_OK) return;
@@ -471,44 +456,17 @@ static FLG_COLD void read_order(flg_opening* o) {
 }
 
 static FLG_COLD void read_weights(flg_opening* o) {
-    if (o->model->info.int16_records) {
-        o->u16 = (int16_t*)read_chunks(o, "bl.u16", 2, 0);
-        o->v16 = (int16_t*)read_chunks(o, "bl.v16", 2, 0);
-        o->steps = (int16_t*)read_chunks(o, "bl.off16", 6, 0);
-        for (uint32_t r = 0; o->status == FLG_OK && r < o->all_vertices; ++r)
-            needs(o, o->u16[r] >= -32767 && o->v16[r] >= -32767);
-    } else {
-        o->u = (float*)read_chunks(o, "bl.u", 4, 0);
-        o->v = (float*)read_chunks(o, "bl.v", 4, 0);
-        for (uint32_t r = 0; o->status == FLG_OK && r < o->all_vertices; ++r)
-            needs(o, fabsf(o->u[r]) <= 1 && fabsf(o->v[r]) <= 1);
-    }
+    o->u = (const float*)read_chunks(o, "bl.u", 4);
+    o->v = (const float*)read_chunks(o, "bl.v", 4);
+    for (uint32_t r = 0; o->status == FLG_OK && r < o->all_vertices; ++r)
+        needs(o, fabsf(o->u[r]) <= 1 && fabsf(o->v[r]) <= 1);
 }
 
 static FLG_COLD void anchor_of(const flg_opening* o, uint32_t record, double m[3]) {
     const uint32_t* cell = o->model->cells + 3 * (size_t)o->cell_of[record];
     const float* rest = o->model->driver_rest;
-    const float u = o->u16 ? flg_weight_of(o->u16[record]) : o->u[record],
-                v = o->u16 ? flg_weight_of(o->v16[record]) : o->v[record];
-    flg_anchor(rest + 3 * (size_t)cell[0], rest + 3 * (size_t)cell[1], rest + 3 * (size_t)cell[2], (double)u, (double)v,
-               m);
-}
-
-/* The positions that int16 records say; those of the driver are exact. */
-static FLG_COLD void decode_positions(flg_opening* o) {
-    uint64_t count;
-    const uint32_t* vertices = (const uint32_t*)read_section(o, "lev.vert", 0, 4, &count);
-    o->positions = (float*)borrow(o, o->all_vertices, 3 * sizeof(float));
-    if (o->status != FLG_OK) return;
-    for (uint32_t r = 0; r < o->all_vertices; ++r) {
-        double m[3];
-        anchor_of(o, r, m);
-        flg_rest_of_steps(m, o->model->scales[o->cell_of[r]], o->steps + 3 * (size_t)r,
-                          o->positions + 3 * (size_t)o->vertex_of[r]);
-    }
-    for (uint64_t i = 0; i < count; ++i)
-        memcpy(o->positions + 3 * (size_t)vertices[i], o->model->driver_rest + 3 * i, 3 * sizeof(float));
-    needs(o, all_finite(o->positions, 3 * (uint64_t)o->all_vertices));
+    flg_anchor(rest + 3 * (size_t)cell[0], rest + 3 * (size_t)cell[1], rest + 3 * (size_t)cell[2], (double)o->u[record],
+               (double)o->v[record], m);
 }
 
 static FLG_COLD double box_diagonal(const float* points, uint64_t count, double centre[3]) {
@@ -529,7 +487,7 @@ static FLG_COLD double box_diagonal(const float* points, uint64_t count, double 
     return sqrt(size[0] * size[0] + (size[1] * size[1] + size[2] * size[2]));
 }
 
-static FLG_COLD void choose_scale(flg_opening* o, uint32_t cells) {
+static FLG_COLD void choose_scale(flg_opening* o) {
     flg_model* model = o->model;
     const uint32_t drivers = model->info.driver_vertices;
     double ignored[3];
@@ -544,8 +502,6 @@ static FLG_COLD void choose_scale(flg_opening* o, uint32_t cells) {
         for (size_t k = 0; k < 3; ++k)
             model->inner_rest[3 * i + k] =
                 model->inner_scale * ((double)model->driver_rest[3 * i + k] - model->centre[k]);
-    for (uint32_t c = 0; model->scales && c < cells; ++c) /* from here on they are of records alone */
-        model->scales[c] = (float)((double)model->scales[c] * model->inner_scale);
 }
 
 /* ---- Sets ---- */
@@ -612,52 +568,29 @@ static FLG_COLD float* keep_floats(flg_opening* o, uint32_t count) {
     if (made) memset(made + count, 0, FLG_PADDING * sizeof(float));
     return made;
 }
-static FLG_COLD int16_t* keep_shorts(flg_opening* o, uint32_t count) {
-    int16_t* made = (int16_t*)keep(o, (uint64_t)count + FLG_PADDING, sizeof(int16_t));
-    if (made) memset(made + count, 0, FLG_PADDING * sizeof(int16_t));
-    return made;
-}
-
-/* Of float records u, v and with positions q; of int16 records the same as steps. */
+/* u, v, and with positions q. */
 static FLG_COLD void fill_records(flg_opening* o, flg_record_set* set, const uint32_t* record, int with_positions) {
     const flg_model* model = o->model;
     flg_records* records = &set->records;
     records->cells = model->cells;
-    records->scale = model->scales;
-    if (model->info.int16_records) {
-        int16_t *u = keep_shorts(o, set->slots), *v = keep_shorts(o, set->slots), *offset[3] = {NULL, NULL, NULL};
-        for (int k = 0; k < 3 && with_positions; ++k) offset[k] = keep_shorts(o, set->slots);
-        if (o->status != FLG_OK) return;
-        for (uint32_t at = 0; at < set->slots; ++at) {
-            const uint32_t r = record[at];
-            u[at] = o->u16[r];
-            v[at] = o->v16[r];
-            for (size_t k = 0; k < 3 && with_positions; ++k) offset[k][at] = o->steps[3 * (size_t)r + k];
+    float *u = keep_floats(o, set->slots), *v = keep_floats(o, set->slots), *q[3] = {NULL, NULL, NULL};
+    for (int k = 0; k < 3 && with_positions; ++k) q[k] = keep_floats(o, set->slots);
+    if (o->status != FLG_OK) return;
+    for (uint32_t at = 0; at < set->slots; ++at) {
+        const uint32_t r = record[at];
+        u[at] = o->u[r];
+        v[at] = o->v[r];
+        if (with_positions) {
+            double m[3];
+            float offset[3];
+            anchor_of(o, r, m);
+            flg_rest_offset(o->positions + 3 * (size_t)o->vertex_of[r], m, model->centre, model->inner_scale, offset);
+            for (int k = 0; k < 3; ++k) q[k][at] = offset[k];
         }
-        records->u16 = u;
-        records->v16 = v;
-        for (int k = 0; k < 3; ++k) records->offset[k] = offset[k];
-    } else {
-        float *u = keep_floats(o, set->slots), *v = keep_floats(o, set->slots), *q[3] = {NULL, NULL, NULL};
-        for (int k = 0; k < 3 && with_positions; ++k) q[k] = keep_floats(o, set->slots);
-        if (o->status != FLG_OK) return;
-        for (uint32_t at = 0; at < set->slots; ++at) {
-            const uint32_t r = record[at];
-            u[at] = o->u[r];
-            v[at] = o->v[r];
-            if (with_positions) {
-                double m[3];
-                float offset[3];
-                anchor_of(o, r, m);
-                flg_rest_offset(o->positions + 3 * (size_t)o->vertex_of[r], m, model->centre, model->inner_scale,
-                                offset);
-                for (int k = 0; k < 3; ++k) q[k][at] = offset[k];
-            }
-        }
-        records->u = u;
-        records->v = v;
-        for (int k = 0; k < 3; ++k) records->q[k] = q[k];
     }
+    records->u = u;
+    records->v = v;
+    for (int k = 0; k < 3; ++k) records->q[k] = q[k];
 }
 
 /* vertices: as for order_set. normals: the unit normal of each slot at rest, or NULL. */
@@ -829,26 +762,6 @@ static FLG_COLD uint32_t find_frames(flg_opening* o, const char* name, flg_frame
     return count;
 }
 
-/* Keeps what a packed model's streams say beside faces, places and records. */
-static FLG_COLD void keep_decoded(flg_opening* o) {
-    static const char names[][5] = {"uv", "nrm", "col", "scal", "obj", "grp", "mat", "smoo", "pose"};
-    for (const flg_plain_section* from = o->decoded; from; from = from->next) {
-        int is_kept = 0;
-        flg_plain_section* kept;
-        for (size_t k = 0; k < sizeof names / sizeof names[0]; ++k)
-            is_kept |= memcmp(from->name, names[k], strlen(names[k])) == 0;
-        if (!is_kept) continue;
-        kept = (flg_plain_section*)keep(o, 1, sizeof *kept);
-        if (!kept) return;
-        *kept = *from;
-        kept->items = keep(o, from->count, from->item);
-        if (!kept->items) return;
-        memcpy(kept->items, from->items, (size_t)(from->count * from->item));
-        kept->next = o->model->decoded;
-        o->model->decoded = kept;
-    }
-}
-
 static FLG_COLD void find_decoded_frames(flg_opening* o) {
     flg_model* model = o->model;
     const flg_plain_section* at;
@@ -945,6 +858,26 @@ static FLG_COLD void read_level(flg_opening* o, uint32_t level) {
     model->info.triangles = (uint32_t)triangles;
 }
 
+/* Keeps what a packed model's streams say beside faces, places and records. */
+static FLG_COLD void keep_decoded(flg_opening* o) {
+    static const char names[][5] = {"uv", "nrm", "col", "scal", "obj", "grp", "mat", "smoo", "pose"};
+    for (const flg_plain_section* from = o->decoded; from; from = from->next) {
+        int is_kept = 0;
+        flg_plain_section* kept;
+        for (size_t k = 0; k < sizeof names / sizeof names[0]; ++k)
+            is_kept |= memcmp(from->name, names[k], strlen(names[k])) == 0;
+        if (!is_kept) continue;
+        kept = (flg_plain_section*)keep(o, 1, sizeof *kept);
+        if (!kept) return;
+        *kept = *from;
+        kept->items = keep(o, from->count, from->item);
+        if (!kept->items) return;
+        memcpy(kept->items, from->items, (size_t)(from->count * from->item));
+        kept->next = o->model->decoded;
+        o->model->decoded = kept;
+    }
+}
+
 static FLG_COLD const void* packed_section(void* user, const char* name, uint32_t index, uint32_t item,
                                            uint64_t* count) {
     flg_opening* o = (flg_opening*)user;
@@ -980,7 +913,7 @@ static FLG_COLD void unpack(flg_opening* o) {
 
 static FLG_COLD void read_model(flg_opening* o, uint32_t level) {
     flg_model* model = o->model;
-    uint32_t code = 0, precision = 0, levels = 0, cells = 0;
+    uint32_t code = 0, records = 0, levels = 0, cells = 0;
     uint64_t vertices = 0;
     if (o->file.is_packed) unpack(o);
     read_value(o, "code", 4, &code);
@@ -988,12 +921,12 @@ static FLG_COLD void read_model(flg_opening* o, uint32_t level) {
     read_value(o, "levels", 4, &levels);
     read_value(o, "mesh.num", 8, &vertices);
     read_value(o, "mesh.org", 24, model->info.origin);
-    read_value(o, "bl.prec", 4, &precision);
-    if (!needs(o, code == 1 && levels > 0 && levels <= FLG_MOST_LEVELS && precision <= 1 && vertices < FLG_NO_INDEX))
+    read_value(o, "bl.prec", 4, &records);
+    if (o->status == FLG_OK && records == 1) fails(o, FLG_OLD_RECORDS);
+    if (!needs(o, code == 1 && levels > 0 && levels <= FLG_MOST_LEVELS && records == 0 && vertices < FLG_NO_INDEX))
         return;
     for (int k = 0; k < 3; ++k) needs(o, fabs(model->info.origin[k]) <= DBL_MAX);
     model->info.levels = levels + 1;
-    model->info.int16_records = precision;
     o->all_vertices = (uint32_t)vertices;
     model->info.vertices = o->all_vertices;
     read_driver(o, &cells);
@@ -1002,12 +935,11 @@ static FLG_COLD void read_model(flg_opening* o, uint32_t level) {
     read_runs(o, cells);
     read_weights(o);
     if (o->status != FLG_OK) return;
-    if (!o->positions) decode_positions(o);
-    choose_scale(o, cells);
+    choose_scale(o);
     make_triangles(o);
     make_sets(o);
     read_frames(o);
-    if (o->status == FLG_OK && !(o->flags & FLG_WITHOUT_FIT)) make_fit(o);
+    if (o->status == FLG_OK && FLG_HAS_FIT && !(o->flags & FLG_WITHOUT_FIT)) make_fit(o);
 }
 
 static const uint32_t FLG_ALL_FLAGS =
@@ -1299,23 +1231,12 @@ FLG_COLD flg_status flg_skin(const flg_model* model, uint32_t first, uint32_t co
         const uint32_t *runs = set->block_runs + v / FLG_BLOCK,
                        record = records->runs[runs[0]].first + (uint32_t)set->from[v];
         const uint32_t cell = run_of(records->runs, runs[0], runs[1], record)->cell;
-        const float u = records->u16 ? flg_weight_of(records->u16[record]) : records->u[record],
-                    w = records->u16 ? flg_weight_of(records->v16[record]) : records->v[record];
+        const float u = records->u[record], w = records->v[record];
         memcpy(drivers, records->cells + 3 * (size_t)cell, 3 * sizeof *drivers);
         weights[0] = 1 - u - w;
         weights[1] = u;
         weights[2] = w;
-        for (size_t k = 0; k < 3; ++k) {
-            double q;
-            if (records->u16) {
-                q = (double)records->scale[cell] * (double)records->offset[k][record];
-                for (size_t c = 0; c < 3; ++c)
-                    q += 0.5 * (double)weights[c] * model->inner_rest[3 * (size_t)drivers[c] + k];
-            } else {
-                q = (double)records->q[k][record];
-            }
-            points[k] = (float)(q / model->inner_scale);
-        }
+        for (size_t k = 0; k < 3; ++k) points[k] = (float)((double)records->q[k][record] / model->inner_scale);
     }
     return FLG_OK;
 }

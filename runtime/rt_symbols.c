@@ -1,5 +1,7 @@
 #include "rt_symbols.h"
 
+#if FLG_HAS_PACKED
+
 enum { FLG_LONGEST_PAUSE = 2048 };
 #define FLG_PAIR(e)                                                                                                    \
     {2u << ((e)-1), (e)-1}, { 3u << ((e)-1), (e)-1 }
@@ -72,3 +74,5 @@ void flg_fetch_last_bits(flg_symbols* in, uint32_t count) {
         in->pending_count += 8;
     }
 }
+
+#endif

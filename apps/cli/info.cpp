@@ -194,9 +194,6 @@ void describe_code(const ModelOutline& model, Report& report) {
         report.add("references", std::to_string(model.references), "references", model.references);
         return report.count("patches", "patches", model.patches);
     }
-    const bool int16 = model.precision == Precision::int16;
-    report.add("precision", int16 ? "int16, 10 bytes a vertex" : "float, 20 bytes a vertex", "precision",
-               int16 ? "int16" : "float");
     if (model.coding) return describe_coding(model, report);
     report.add("bound across gaps", with_commas(model.across_gap.size()), "across_gap",
                vertices_json(model.across_gap));

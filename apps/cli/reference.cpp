@@ -32,8 +32,8 @@ void refuse_law(const std::string& path, const Session& session) {
 
 void strip_with_reference_code(const std::string& input, const std::string& output, const ReferenceOptions& options,
                                Session& session) {
-    const std::string given = session.first_given(
-        {"--error", "--fidelity", "--fidelity-from", "--driver", "--max-edge", "--reorder", "--precision"});
+    const std::string given =
+        session.first_given({"--error", "--fidelity", "--fidelity-from", "--driver", "--max-edge", "--reorder"});
     if (!given.empty()) refuse(given + " is for the blend code: leave out --code reference.");
     const double start = now_seconds();
     Mesh mesh = session.read_mesh(input);

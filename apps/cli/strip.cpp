@@ -117,8 +117,8 @@ void run(const StripCommandOptions& options, Session& session) {
     const double read = now_seconds();
     StrippedToFidelity result;
     if (!options.driver.empty())
-        result.stripped = require(strip_to_driver(std::move(mesh), session.read_mesh(options.driver),
-                                                  options.strip.precision, session.context()));
+        result.stripped =
+            require(strip_to_driver(std::move(mesh), session.read_mesh(options.driver), session.context()));
     else if (options.fidelity)
         result = require(
             strip_to_fidelity(mesh, options.strip, {*options.fidelity, options.fidelity_from}, session.context()));
@@ -180,9 +180,6 @@ Command strip_command() {
              choice<bool>("--code", options->with_reference_code, {{"blend", false}, {"reference", true}},
                           "blend: for any mesh (default); reference: the method of the report Detail-Preserving "
                           "Animation, for regular quads"),
-             choice<Precision>("--precision", strip.precision,
-                               {{"float", Precision::float32}, {"int16", Precision::int16}},
-                               "Blend code: float (20 bytes per vertex, default) or int16 (10 bytes)"),
              Option("--reorder", strip.reorder,
                     "Renumber vertices so that neighbours lie together: a mesh in random order restores faster. "
                     "'restore --input-order' writes the old order")
@@ -196,7 +193,7 @@ Command strip_command() {
                  .one_of({"3", "4", "6"})
                  .with_default()},
         .examples = "  filigree strip scan.ply -o scan.fil\n"
-                    "  filigree strip scan.ply -o scan.fil --base 5000 --precision int16\n"
+                    "  filigree strip scan.ply -o scan.fil --base 5000\n"
                     "  filigree strip scan.ply -o scan.fil --fidelity 1e-5\n"
                     "  filigree strip scan.ply -o scan.fil --driver cage.obj\n"
                     "  filigree strip cube.obj -o cube.fil --code reference",

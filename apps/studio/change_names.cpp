@@ -43,9 +43,7 @@ QString name_of_change(const Shape& before, const Shape& after) {
                    title_of(after.name));
 }
 
-QString name_of_change(const StripOptions& before, const StripOptions& after) {
-    if (before.precision != after.precision)
-        return after.precision == Precision::float32 ? "Full precision" : "Half-size precision";
+QString name_of_change(const StripOptions&, const StripOptions& after) {
     if (after.base) return "Driver of " + counted(*after.base, "vertex", "vertices");
     if (after.levels) return counted(*after.levels, "level", "levels") + " of detail";
     if (after.error) return QString("Driver within %1 % of the mesh").arg(100 * *after.error);

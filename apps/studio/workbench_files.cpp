@@ -45,7 +45,6 @@ Result<State> read_state(const std::string& path, const RunContext& context) {
         Result<PoseSequence> poses = read_poses(*bytes, path, context);
         if (!poses) return poses.error();
         state.strip.base = model->driver().vertices.size();
-        state.strip.precision = model->detail.precision;
         state.model = std::make_shared<const Model>(std::move(*model));
         if (poses->frames.size() == 1) { // a shape, not a motion
             state.handle_pose = std::make_shared<const Pose>(std::move(poses->frames[0]));

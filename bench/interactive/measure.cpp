@@ -36,7 +36,7 @@ public:
 
     void restore() {
         const double triad = measure_triad();
-        for (const Precision precision : {Precision::float32, Precision::int16}) restore_blend(precision, triad);
+        restore_blend(triad);
         restore_reference(triad);
     }
 
@@ -50,7 +50,7 @@ public:
         add("strip.total", total, "s");
         add("strip.simplify", simplify, "s");
         add("strip.bind", bind, "s");
-        const Model& model = blend_model(Precision::float32);
+        const Model& model = blend_model();
         std::string bytes;
         add("strip.write_model", median_seconds([&] { bytes = write_model(model); }), "s");
         add("strip.read_model", median_seconds([&] { read_model(bytes, "model", context_).value(); }), "s");
@@ -101,7 +101,7 @@ public:
 
     /// A deformer that costs something, over every vertex and over the driver alone.
     void deform() {
-        const Model& model = blend_model(Precision::float32);
+        const Model& model = blend_model();
         const Box box = world_bounds(mesh_);
         std::mt19937_64 random(1);
         std::vector<Vec3d> centres, displacements;
@@ -137,7 +137,7 @@ public:
 
     /// As-rigid-as-possible on the driver, restored in every round, as a hand would see it.
     void handles() {
-        const Model& model = blend_model(Precision::float32);
+        const Model& model = blend_model();
         const Mesh driver = level_mesh(model, 0);
         const std::vector<Triangle> triangles = triangulate(driver).triangles;
         const Box box = bounds(driver.positions);
@@ -164,7 +164,7 @@ public:
     }
 
     void fidelity() {
-        const Model& model = blend_model(Precision::float32);
+        const Model& model = blend_model();
         Mesh copy = mesh_;
         const Result<ReferenceModel> reference =
             strip_to_reference(std::move(copy), {.base = model.driver().vertices.size()}, context_);
@@ -193,10 +193,9 @@ private:
         measured_.results.push_back({std::move(name), value, std::move(unit)});
     }
 
-    const Model& blend_model(Precision precision) {
-        std::optional<Model>& model = models_[static_cast<std::size_t>(precision)];
-        if (!model) model = strip(mesh_, {.base = base_, .precision = precision}, context_).value().model;
-        return *model;
+    const Model& blend_model() {
+        if (!model_) model_ = strip(mesh_, {.base = base_}, context_).value().model;
+        return *model_;
     }
 
     /// Bytes a second of the streaming triad; also reported with ordinary stores.
@@ -211,8 +210,8 @@ private:
         return streaming;
     }
 
-    void restore_blend(Precision precision, double triad) {
-        const Model& model = blend_model(precision);
+    void restore_blend(double triad) {
+        const Model& model = blend_model();
         const auto& detail = model.detail;
         std::vector<BlendRestorer::Item> items(mesh_.vertex_count());
         for (Index v = 0; v < items.size(); ++v) items[v] = {v, v};
@@ -222,9 +221,9 @@ private:
         const std::vector<Vec3f> driver = driver_positions(model);
         const std::vector<Mat3f> gradients(driver.size(), Mat3f::Identity());
         std::vector<Vec3f> positions(items.size()), out_normals(items.size());
-        const std::string name = precision == Precision::int16 ? "restore.int16" : "restore.float";
+        const std::string name = "restore.float";
         const double count = double(items.size());
-        const double record_bytes = precision == Precision::int16 ? 10 : 20;
+        const double record_bytes = 20;
 
         const double seconds =
             median_seconds([&] { restorer.restore(driver, gradients, positions, {}, false, context_); });
@@ -266,7 +265,7 @@ private:
     Mesh mesh_;
     std::optional<std::size_t> base_;
     const RunContext& context_;
-    std::array<std::optional<Model>, 2> models_;
+    std::optional<Model> model_;
     Measured measured_;
 };
 

@@ -17,7 +17,6 @@ PAIRS = [
     ("restore, float / Surface Deform, a frame", "restore.float", "blender.surface_deform_frame"),
     ("restore, float / Surface Deform, its own part", "restore.float", "blender.surface_deform"),
     ("restore, float / decode float (a ceiling)", "restore.float", "meshoptimizer.decode_float"),
-    ("restore, int16 / decode int16 (a ceiling)", "restore.int16", "meshoptimizer.decode_int16"),
     ("restore, regular, reference code / stencils", "restore.reference", "opensubdiv.stencils"),
     ("restore, regular, reference code / level by level", "restore.reference", "opensubdiv.levels"),
     ("simplify / simplify", "strip.simplify", "meshoptimizer.simplify"),

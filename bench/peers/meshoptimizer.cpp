@@ -43,17 +43,4 @@ int main(int argc, char** argv) {
     mesh.positions.resize(meshopt_optimizeVertexFetch(mesh.positions.data(), indices, index_count,
                                                       mesh.positions.data(), vertex_count, sizeof mesh.positions[0]));
     report_decode("meshoptimizer.decode_float", mesh.positions);
-
-    std::array<float, 3> low = mesh.positions[0];
-    float extent = 0;
-    for (const auto& position : mesh.positions)
-        for (int axis = 0; axis < 3; ++axis) low[axis] = std::min(low[axis], position[axis]);
-    for (const auto& position : mesh.positions)
-        for (int axis = 0; axis < 3; ++axis) extent = std::max(extent, position[axis] - low[axis]);
-    std::vector<std::array<std::uint16_t, 4>> rounded(mesh.positions.size());
-    for (std::size_t i = 0; i < rounded.size(); ++i)
-        for (int axis = 0; axis < 3; ++axis)
-            rounded[i][axis] =
-                static_cast<std::uint16_t>(std::lround((mesh.positions[i][axis] - low[axis]) / extent * 65535.0f));
-    report_decode("meshoptimizer.decode_int16", rounded);
 }

@@ -57,10 +57,6 @@ inline FrameSource<Pose> frames_of(const PoseSequence& sequence) {
 // ---------------------------------------------------------------------------------------------------------------------
 // Models
 
-/// float32: 20 bytes a vertex. int16: 10 bytes a vertex, and faster where memory is the limit. The error of int16 is at
-/// most half a step an axis, where 32767 steps are the largest offset in the cell; usually below 1e-6 of the diagonal.
-enum class Precision { float32, int16 };
-
 /// How the vertices of a mesh are bound to the driver. Each vertex belongs to one cell, a triangle of the driver, and
 /// follows the positions and gradients of its three vertices. (Where the driver has no faces, a cell is one vertex,
 /// named three times.) Records are ordered by cell. Record r is vertex order[r] of the mesh.
@@ -69,10 +65,7 @@ struct BlendDetail {
     std::vector<Triangle> cells;
     std::vector<Index> cell_offsets = {0}; ///< cell c has the records cell_offsets[c] .. cell_offsets[c + 1] - 1
     std::vector<Index> order;              ///< a permutation of the mesh's vertices
-    std::vector<float> u, v;               ///< one a record; multiples of 1/32767 for int16
-    Precision precision = Precision::float32;
-    std::vector<std::array<std::int16_t, 3>> offsets; ///< int16 only: offset from the cell, in steps of cell_scales
-    std::vector<float> cell_scales;                   ///< int16 only: model units of one step, one a cell
+    std::vector<float> u, v;               ///< one a record
 
     /// Vertices of parts that have no driver vertex (rivets, buttons): bound to the driver beside them. Ascending.
     std::vector<Index> across_gap;
@@ -149,7 +142,6 @@ struct StripOptions {
     /// Longest edge that simplification makes, fraction of the diagonal. Edges of the mesh itself may be longer. The
     /// driver then keeps vertices in flat parts and may have more of them than asked for.
     std::optional<double> max_edge = {};
-    Precision precision = Precision::float32;
     /// Levels with more vertices than this are simplified in parallel clusters, in linear time; smaller levels in one
     /// piece. With max_edge all levels are simplified in one piece.
     std::size_t one_piece = 600'000;
@@ -186,14 +178,12 @@ Result<Stripped> strip(Mesh mesh, const StripOptions& options = {}, const RunCon
 /// belongs to along the surface. No driver is refused: the report's warnings say when it is inside out or too far away.
 /// Cost O(V log V). Errors: usage (check_mesh refuses one of the two), unsuitable (no vertices in one of them; more
 /// triangles or vertices than indices), cancelled.
-Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, Precision precision = Precision::float32,
-                                 const RunContext& context = RunContext());
+Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, const RunContext& context = RunContext());
 
 /// Takes the detail off a mesh, for a driver that consists of vertices of the mesh. The model has two levels: the
 /// driver and the mesh. driver: its faces are triangles. Cost O(V log V). Errors: usage (check_mesh refuses the mesh;
 /// the vertices of the driver do not ascend or are not the mesh's; a face is no triangle), unsuitable (no vertices),
 /// cancelled.
-Result<Model> bind_to_own_driver(Mesh mesh, Level driver, Precision precision = Precision::float32,
-                                 const RunContext& context = RunContext());
+Result<Model> bind_to_own_driver(Mesh mesh, Level driver, const RunContext& context = RunContext());
 
 } // namespace filigree

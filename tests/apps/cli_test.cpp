@@ -197,27 +197,24 @@ TEST_F(Cli, ADriverMadeElsewhereAddsNoVertices) {
     ok({"make", "wavy-sphere", "-o", "cage.obj", "--resolution", "8", "--amplitude", "0"});
     const auto vertices = [&](const std::string& file) { return json({"info", file})["vertices"]; };
     const Json count = vertices("ball.ply");
-    for (const char* precision : {"float", "int16"}) {
-        const Json stripped =
-            json({"strip", "ball.ply", "-o", "m.fil", "--driver", "cage.obj", "--precision", precision});
-        EXPECT_EQ(stripped["vertices"], count);
-        EXPECT_EQ(json({"info", "m.fil"})["levels"].back()["vertices"], count);
-        ok({"level", "m.fil", "1", "-o", "finest.ply"});
-        ok({"restore", "m.fil", "--pose", "cage.obj", "-o", "back.obj"});
-        ok({"deform", "m.fil", "-o", "bent.ply", "--bend", "40"});
-        ok({"deform", "ball.ply", "-o", "truth.ply", "--bend", "40"});
-        for (const char* file : {"finest.ply", "back.obj", "bent.ply"}) EXPECT_EQ(vertices(file), count) << file;
-        EXPECT_LT(json({"compare", "ball.ply", "back.obj"})["rms"].get<double>(), 1e-3);
-        EXPECT_LT(json({"compare", "truth.ply", "bent.ply"})["rms"].get<double>(), 1e-2);
+    const Json stripped = json({"strip", "ball.ply", "-o", "m.fil", "--driver", "cage.obj"});
+    EXPECT_EQ(stripped["vertices"], count);
+    EXPECT_EQ(json({"info", "m.fil"})["levels"].back()["vertices"], count);
+    ok({"level", "m.fil", "1", "-o", "finest.ply"});
+    ok({"restore", "m.fil", "--pose", "cage.obj", "-o", "back.obj"});
+    ok({"deform", "m.fil", "-o", "bent.ply", "--bend", "40"});
+    ok({"deform", "ball.ply", "-o", "truth.ply", "--bend", "40"});
+    for (const char* file : {"finest.ply", "back.obj", "bent.ply"}) EXPECT_EQ(vertices(file), count) << file;
+    EXPECT_LT(json({"compare", "ball.ply", "back.obj"})["rms"].get<double>(), 1e-3);
+    EXPECT_LT(json({"compare", "truth.ply", "bent.ply"})["rms"].get<double>(), 1e-2);
 
-        ok({"deform", "m.fil", "-o", "moving.pc2", "--bend", "40", "--frames", "3"});
-        ok({"deform", "m.fil", "-o", "moving.glb", "--bend", "40", "--frames", "3"});
-        EXPECT_EQ(std::filesystem::file_size(path("moving.pc2")), 32 + 3 * 12 * count.get<std::size_t>());
-        EXPECT_EQ(vertices("moving.glb"), count);
-        ok({"pack", "m.fil", "-o", "packed.fil", "--keep-order"});
-        ok({"restore", "packed.fil", "--pose", "cage.obj", "-o", "packed.ply"});
-        EXPECT_EQ(vertices("packed.ply"), count);
-    }
+    ok({"deform", "m.fil", "-o", "moving.pc2", "--bend", "40", "--frames", "3"});
+    ok({"deform", "m.fil", "-o", "moving.glb", "--bend", "40", "--frames", "3"});
+    EXPECT_EQ(std::filesystem::file_size(path("moving.pc2")), 32 + 3 * 12 * count.get<std::size_t>());
+    EXPECT_EQ(vertices("moving.glb"), count);
+    ok({"pack", "m.fil", "-o", "packed.fil", "--keep-order"});
+    ok({"restore", "packed.fil", "--pose", "cage.obj", "-o", "packed.ply"});
+    EXPECT_EQ(vertices("packed.ply"), count);
 }
 
 TEST_F(Cli, ReorderedVerticesAreWrittenInTheirOldOrder) {
@@ -414,8 +411,7 @@ TEST_F(Cli, PipelinesCarryMeshesAndModelsUnmixed) {
 }
 
 TEST_F(Cli, UnmovedDriverGivesTheMeshBack) {
-    const std::vector<std::vector<std::string>> ways = {
-        {}, {"--precision", "int16"}, {"--base", "100"}, {"--levels", "2"}, {"--error", "0.01"}};
+    const std::vector<std::vector<std::string>> ways = {{}, {"--base", "100"}, {"--levels", "2"}, {"--error", "0.01"}};
     for (const auto& way : ways) {
         SCOPED_TRACE(testing::PrintToString(way));
         make_model(way);
@@ -532,8 +528,7 @@ TEST_F(Cli, WhatIsOfOneCodeIsRefusedWithTheOther) {
     fails(7, {"deform", "cube.fil", "-o", "x.fil", "--bend", "9", "--frames", "5"}, {"reference code", ".fil"});
     fails(7, {"export", "cube.fil", "-o", "x.glb"}, {"cube.fil", "reference code"});
     fails(7, {"pack", "cube.fil", "-o", "x.fil"}, {"cube.fil", "reference code"});
-    for (const std::vector<std::string>& option :
-         {std::vector<std::string>{"--error", "0.1"}, {"--max-edge", "0.1"}, {"--precision", "int16"}}) {
+    for (const std::vector<std::string>& option : {std::vector<std::string>{"--error", "0.1"}, {"--max-edge", "0.1"}}) {
         std::vector<std::string> strip = {"strip", "cube.obj", "-o", "x.fil", "--code", "reference"};
         strip.insert(strip.end(), option.begin(), option.end());
         fails(2, strip, {option[0]});

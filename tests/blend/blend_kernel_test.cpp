@@ -20,11 +20,11 @@ struct Scene {
     std::vector<VertexTransform> transforms;
     std::vector<Vec3d> rest, now;
     std::vector<Mat3d> gradients;
-    std::vector<Vec3d> points, normals; ///< p and n of each record, as its (perhaps rounded) numbers say
+    std::vector<Vec3d> points, normals; ///< p and n of each record, as its rounded numbers say
 };
 
 /// run_lengths: records of each run; every run has a cell of its own, so its number is the cell's.
-Scene make_scene(const std::vector<Index>& run_lengths, bool int16, unsigned seed) {
+Scene make_scene(const std::vector<Index>& run_lengths, unsigned seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> any(-1, 1), weight(0, 0.5);
     const auto any3 = [&] { return Vec3d(any(random), any(random), any(random)); };
@@ -40,7 +40,6 @@ Scene make_scene(const std::vector<Index>& run_lengths, bool int16, unsigned see
         VertexTransform& t = scene.transforms.emplace_back();
         const Vec3d half = 0.5 * scene.rest[i], shifted = scene.now[i] - scene.gradients[i] * half;
         for (int k = 0; k < 3; ++k) t.t[k] = static_cast<float>(shifted[k]);
-        for (int k = 0; k < 3; ++k) t.half_rest[k] = static_cast<float>(half[k]);
         for (int k = 0; k < 9; ++k) t.a[k] = static_cast<float>(scene.gradients[i](k % 3, k / 3));
     }
     Records& records = scene.records;
@@ -49,30 +48,18 @@ Scene make_scene(const std::vector<Index>& run_lengths, bool int16, unsigned see
         records.cells.push_back({static_cast<Index>(random() % drivers), static_cast<Index>(random() % drivers),
                                  static_cast<Index>(random() % drivers)});
         records.runs.push_back({cell, static_cast<Index>(records.count), length});
-        records.scale.push_back(1e-5f * static_cast<float>(1 + cell % 7));
         for (Index k = 0; k < length; ++k, ++records.count) {
             Vec3d b(0, weight(random), weight(random));
             const Vec3d offset = 0.1 * any3(), n = as_float(any3().normalized());
-            if (int16) {
-                records.u16.push_back(static_cast<std::int16_t>(std::lround(b[1] * 32767)));
-                records.v16.push_back(static_cast<std::int16_t>(std::lround(b[2] * 32767)));
-                b = {0, records.u16.back() / 32767.0, records.v16.back() / 32767.0};
-            } else {
-                records.u.push_back(static_cast<float>(b[1]));
-                records.v.push_back(static_cast<float>(b[2]));
-                b = {0, records.u.back(), records.v.back()};
-            }
+            records.u.push_back(static_cast<float>(b[1]));
+            records.v.push_back(static_cast<float>(b[2]));
+            b = {0, records.u.back(), records.v.back()};
             b[0] = 1 - b[1] - b[2];
             Vec3d m = Vec3d::Zero(), rounded;
             for (int i = 0; i < 3; ++i) m += b[i] * scene.rest[records.cells[cell][i]];
             for (int i = 0; i < 3; ++i) {
-                if (int16) {
-                    records.offset[i].push_back(static_cast<std::int16_t>(std::lround(offset[i] / 1e-5 * 0.3)));
-                    rounded[i] = m[i] + records.offset[i].back() * double(records.scale[cell]);
-                } else {
-                    records.q[i].push_back(static_cast<float>(offset[i] + m[i] / 2));
-                    rounded[i] = records.q[i].back() + m[i] / 2;
-                }
+                records.q[i].push_back(static_cast<float>(offset[i] + m[i] / 2));
+                rounded[i] = records.q[i].back() + m[i] / 2;
                 records.normal[i].push_back(k % 5 == 3 ? 0 : static_cast<float>(n[i]));
             }
             scene.points.push_back(rounded);
@@ -82,9 +69,7 @@ Scene make_scene(const std::vector<Index>& run_lengths, bool int16, unsigned see
     const std::size_t padded = records.count + kPadding;
     for (auto* floats : {&records.u, &records.v, &records.q[0], &records.q[1], &records.q[2], &records.normal[0],
                          &records.normal[1], &records.normal[2]})
-        if (!floats->empty()) floats->resize(padded);
-    for (auto* shorts : {&records.u16, &records.v16, &records.offset[0], &records.offset[1], &records.offset[2]})
-        if (!shorts->empty()) shorts->resize(padded);
+        floats->resize(padded);
     records.slot.resize(records.count);
     std::iota(records.slot.begin(), records.slot.end(), Index{0});
     std::shuffle(records.slot.begin(), records.slot.end(), random);
@@ -98,8 +83,8 @@ std::pair<Vec3d, Vec3d> plain(const Scene& scene, std::size_t record) {
                                         [](std::size_t r, const Run& x) { return r < x.first; }) -
                        1);
     const Triangle& cell = records.cells[run.cell];
-    const double u = records.is_int16() ? records.u16[record] / 32767.0 : double(records.u[record]);
-    const double v = records.is_int16() ? records.v16[record] / 32767.0 : double(records.v[record]);
+    const double u = double(records.u[record]);
+    const double v = double(records.v[record]);
     const Vec3d b(1 - u - v, u, v), p = scene.points[record];
     Mat3d blended = Mat3d::Zero();
     for (int i = 0; i < 3; ++i) blended += b[i] * scene.gradients[cell[i]];
@@ -135,37 +120,33 @@ std::vector<Index> every_length() {
 }
 
 TEST(BlendKernel, IsTheHermiteBlend) {
-    for (const bool int16 : {false, true}) {
-        const Scene scene = make_scene(every_length(), int16, 1);
-        const Restored out = restored(scene, lane_counts().back(), false);
-        for (std::size_t r = 0; r < scene.records.count; ++r) {
-            const auto [p, n] = plain(scene, r);
-            ASSERT_LT((out.positions[r].cast<double>() - p).norm(), 2e-6) << r << ' ' << int16;
-            if (scene.normals[r].isZero()) {
-                ASSERT_EQ(out.normals[r], Vec3f(Vec3f::Zero())) << r;
-                continue;
-            }
-            ASSERT_NEAR(out.normals[r].norm(), 1, 1e-6) << r;
-            // A cofactor that nearly vanishes has lost its digits before it is normalised.
-            ASSERT_LT((out.normals[r].cast<double>() - n).norm(), 2e-3) << r << ' ' << int16;
+    const Scene scene = make_scene(every_length(), 1);
+    const Restored out = restored(scene, lane_counts().back(), false);
+    for (std::size_t r = 0; r < scene.records.count; ++r) {
+        const auto [p, n] = plain(scene, r);
+        ASSERT_LT((out.positions[r].cast<double>() - p).norm(), 2e-6) << r;
+        if (scene.normals[r].isZero()) {
+            ASSERT_EQ(out.normals[r], Vec3f(Vec3f::Zero())) << r;
+            continue;
         }
+        ASSERT_NEAR(out.normals[r].norm(), 1, 1e-6) << r;
+        // A cofactor that nearly vanishes has lost its digits before it is normalised.
+        ASSERT_LT((out.normals[r].cast<double>() - n).norm(), 2e-3) << r;
     }
 }
 
 TEST(BlendKernel, EveryWidthGivesTheSameBytes) {
-    for (const bool int16 : {false, true}) {
-        const Scene scene = make_scene(every_length(), int16, 2);
-        const Restored first = restored(scene, lane_counts().front(), false);
-        for (const int lanes : lane_counts()) {
-            const Restored out = restored(scene, lanes, false);
-            EXPECT_TRUE(same_bytes(out.positions, first.positions)) << lanes;
-            EXPECT_TRUE(same_bytes(out.normals, first.normals)) << lanes;
-        }
+    const Scene scene = make_scene(every_length(), 2);
+    const Restored first = restored(scene, lane_counts().front(), false);
+    for (const int lanes : lane_counts()) {
+        const Restored out = restored(scene, lanes, false);
+        EXPECT_TRUE(same_bytes(out.positions, first.positions)) << lanes;
+        EXPECT_TRUE(same_bytes(out.normals, first.normals)) << lanes;
     }
 }
 
 TEST(BlendKernel, OrderAndChoiceOfOutputsDoNotMatter) {
-    const Scene scene = make_scene({1, 17, 512, 3, 64, 511}, false, 3);
+    const Scene scene = make_scene({1, 17, 512, 3, 64, 511}, 3);
     const Restored by_record = restored(scene, lane_counts().back(), false);
     const Restored by_slot = restored(scene, lane_counts().back(), true);
     std::vector<Vec3f> alone(scene.records.count), normals_alone(scene.records.count);
@@ -180,7 +161,7 @@ TEST(BlendKernel, OrderAndChoiceOfOutputsDoNotMatter) {
 }
 
 TEST(BlendKernel, ScaleMultipliesPositionsExactly) {
-    const Scene scene = make_scene({100, 200}, false, 4);
+    const Scene scene = make_scene({100, 200}, 4);
     const Restored plain_size = restored(scene, lane_counts().back(), false);
     std::vector<Vec3f> scaled(scene.records.count);
     blend_kernel::restore(scene.records, scene.transforms, {.positions = scaled.data(), .scale = 1024}, kOneThread);
@@ -191,7 +172,7 @@ TEST(BlendKernel, ScaleMultipliesPositionsExactly) {
 TEST(BlendKernel, LargeOutputsOnThreadsAreTheSameBytes) {
     std::vector<Index> lengths;
     for (unsigned i = 0; i < 6000; ++i) lengths.push_back(1 + i * 37 % 509);
-    const Scene scene = make_scene(lengths, true, 5);
+    const Scene scene = make_scene(lengths, 5);
     const std::size_t count = scene.records.count;
     ASSERT_GT(count * sizeof(Vec3f), std::size_t{16} << 20);
     std::vector<Vec3f> by_slot(count);
@@ -227,70 +208,66 @@ void sort_into_blocks(Scene& scene) {
 
 /// In memory that the caches hold and in more, at every alignment of a float, in every width and on threads.
 TEST(BlendKernel, BlocksAreTheSameBytesAsScatteredRecords) {
-    for (const bool int16 : {false, true})
-        for (const std::size_t blocks : {3u, 44u}) {
-            std::vector<Index> lengths(blocks * kBlock / 256, 256);
-            for (Index length : {200, 3}) lengths.push_back(length); // the last block is not full
-            Scene scene = make_scene(lengths, int16, 9);
-            sort_into_blocks(scene);
-            Scene scattered = scene;
-            scattered.records.block_runs.clear();
-            const Restored wanted = restored(scattered, lane_counts().back(), true);
-            for (const int lanes : lane_counts()) {
-                const Restored out = restored(scene, lanes, true, RunContext(2));
-                EXPECT_TRUE(same_bytes(out.positions, wanted.positions)) << blocks << ' ' << lanes;
-                EXPECT_TRUE(same_bytes(out.normals, wanted.normals)) << blocks << ' ' << lanes;
-            }
-            for (const std::size_t shift : {1u, 2u, 3u}) {
-                std::vector<Vec3f> out(scene.records.count + 4, Vec3f::Constant(7));
-                blend_kernel::restore(scene.records, scene.transforms,
-                                      {.positions = out.data() + shift, .in_order = true, .scale = 2}, kOneThread);
-                EXPECT_EQ(out[shift - 1], Vec3f(Vec3f::Constant(7)));
-                EXPECT_EQ(out[shift + scene.records.count], Vec3f(Vec3f::Constant(7)));
-                for (std::size_t v = 0; v < scene.records.count; ++v)
-                    ASSERT_EQ(out[shift + v], Vec3f(2 * wanted.positions[v])) << v;
-            }
+    for (const std::size_t blocks : {3u, 44u}) {
+        std::vector<Index> lengths(blocks * kBlock / 256, 256);
+        for (Index length : {200, 3}) lengths.push_back(length); // the last block is not full
+        Scene scene = make_scene(lengths, 9);
+        sort_into_blocks(scene);
+        Scene scattered = scene;
+        scattered.records.block_runs.clear();
+        const Restored wanted = restored(scattered, lane_counts().back(), true);
+        for (const int lanes : lane_counts()) {
+            const Restored out = restored(scene, lanes, true, RunContext(2));
+            EXPECT_TRUE(same_bytes(out.positions, wanted.positions)) << blocks << ' ' << lanes;
+            EXPECT_TRUE(same_bytes(out.normals, wanted.normals)) << blocks << ' ' << lanes;
         }
-}
-
-/// A run's last lanes may write past its end, but not into what follows the output, nor into another thread's part.
-TEST(BlendKernel, WritesNothingBehindItsOutput) {
-    for (const bool int16 : {false, true})
-        for (Index last = 1; last <= 40; ++last) {
-            const Scene scene = make_scene({100, 3, last}, int16, last);
-            const Restored wanted = restored(scene, lane_counts().back(), true);
-            for (const int lanes : lane_counts()) {
-                std::vector<Vec3f> out(scene.records.count + 16, Vec3f::Constant(7)), normals = out;
-                blend_kernel::restore(scene.records, scene.transforms,
-                                      {.positions = out.data(), .normals = normals.data()}, lanes, kOneThread);
-                for (std::size_t r = 0; r < scene.records.count; ++r) {
-                    ASSERT_EQ(out[r], wanted.positions[scene.records.slot[r]]) << lanes << ' ' << last;
-                    ASSERT_EQ(normals[r], wanted.normals[scene.records.slot[r]]) << lanes << ' ' << last;
-                }
-                for (std::size_t r = scene.records.count; r < out.size(); ++r) {
-                    ASSERT_EQ(out[r], Vec3f(Vec3f::Constant(7))) << lanes << ' ' << last;
-                    ASSERT_EQ(normals[r], Vec3f(Vec3f::Constant(7))) << lanes << ' ' << last;
-                }
-            }
-        }
-}
-
-TEST(BlendKernel, NoThreadChangesAByte) {
-    FILIGREE_NEEDS_TWO_THREADS();
-    for (const bool int16 : {false, true}) {
-        std::vector<Index> lengths(200, 300);
-        const Scene scene = make_scene(lengths, int16, 6);
-        const Restored one = restored(scene, lane_counts().back(), true);
-        for (const unsigned threads : {2u, 5u}) {
-            const Restored out = restored(scene, lane_counts().back(), true, RunContext(threads));
-            EXPECT_TRUE(same_bytes(out.positions, one.positions));
-            EXPECT_TRUE(same_bytes(out.normals, one.normals));
+        for (const std::size_t shift : {1u, 2u, 3u}) {
+            std::vector<Vec3f> out(scene.records.count + 4, Vec3f::Constant(7));
+            blend_kernel::restore(scene.records, scene.transforms,
+                                  {.positions = out.data() + shift, .in_order = true, .scale = 2}, kOneThread);
+            EXPECT_EQ(out[shift - 1], Vec3f(Vec3f::Constant(7)));
+            EXPECT_EQ(out[shift + scene.records.count], Vec3f(Vec3f::Constant(7)));
+            for (std::size_t v = 0; v < scene.records.count; ++v)
+                ASSERT_EQ(out[shift + v], Vec3f(2 * wanted.positions[v])) << v;
         }
     }
 }
 
+/// A run's last lanes may write past its end, but not into what follows the output, nor into another thread's part.
+TEST(BlendKernel, WritesNothingBehindItsOutput) {
+    for (Index last = 1; last <= 40; ++last) {
+        const Scene scene = make_scene({100, 3, last}, last);
+        const Restored wanted = restored(scene, lane_counts().back(), true);
+        for (const int lanes : lane_counts()) {
+            std::vector<Vec3f> out(scene.records.count + 16, Vec3f::Constant(7)), normals = out;
+            blend_kernel::restore(scene.records, scene.transforms, {.positions = out.data(), .normals = normals.data()},
+                                  lanes, kOneThread);
+            for (std::size_t r = 0; r < scene.records.count; ++r) {
+                ASSERT_EQ(out[r], wanted.positions[scene.records.slot[r]]) << lanes << ' ' << last;
+                ASSERT_EQ(normals[r], wanted.normals[scene.records.slot[r]]) << lanes << ' ' << last;
+            }
+            for (std::size_t r = scene.records.count; r < out.size(); ++r) {
+                ASSERT_EQ(out[r], Vec3f(Vec3f::Constant(7))) << lanes << ' ' << last;
+                ASSERT_EQ(normals[r], Vec3f(Vec3f::Constant(7))) << lanes << ' ' << last;
+            }
+        }
+    }
+}
+
+TEST(BlendKernel, NoThreadChangesAByte) {
+    FILIGREE_NEEDS_TWO_THREADS();
+    std::vector<Index> lengths(200, 300);
+    const Scene scene = make_scene(lengths, 6);
+    const Restored one = restored(scene, lane_counts().back(), true);
+    for (const unsigned threads : {2u, 5u}) {
+        const Restored out = restored(scene, lane_counts().back(), true, RunContext(threads));
+        EXPECT_TRUE(same_bytes(out.positions, one.positions));
+        EXPECT_TRUE(same_bytes(out.normals, one.normals));
+    }
+}
+
 TEST(BlendKernel, NoRecordsAreFine) {
-    const Scene scene = make_scene({}, false, 7);
+    const Scene scene = make_scene({}, 7);
     Vec3f untouched(1, 2, 3);
     blend_kernel::restore(scene.records, scene.transforms, {.positions = &untouched}, kOneThread);
     EXPECT_EQ(untouched, Vec3f(1, 2, 3));

@@ -13,20 +13,18 @@ TEST(CheckedStrip, WhatIsBrokenIsRefused) {
     const Mesh sound = make_box(Vec3d::Zero(), Vec3d::Ones());
     FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED([](const Mesh& m) { return strip(m, {}, kOneThread); });
     FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED([](const Mesh& m) { return strip(m, {.reorder = true}, kOneThread); });
-    FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED(
-        [&](const Mesh& m) { return strip_to_driver(m, sound, Precision::float32, kOneThread); });
-    FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED(
-        [&](const Mesh& m) { return strip_to_driver(sound, m, Precision::float32, kOneThread); });
+    FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED([&](const Mesh& m) { return strip_to_driver(m, sound, kOneThread); });
+    FILIGREE_EXPECT_BROKEN_MESHES_ARE_REFUSED([&](const Mesh& m) { return strip_to_driver(sound, m, kOneThread); });
 }
 
 TEST(CheckedStrip, ADriverOfTheMeshesOwnVerticesHasToBeOne) {
     const Mesh mesh = make_wavy_sphere({.resolution = 8});
     const Level sound = strip(mesh, {.base = 40}, kOneThread).value().model.driver();
-    ASSERT_TRUE(bind_to_own_driver(mesh, sound, Precision::float32, kOneThread).ok());
+    ASSERT_TRUE(bind_to_own_driver(mesh, sound, kOneThread).ok());
     const auto refused = [&](const auto& damage) {
         Level driver = sound;
         damage(driver);
-        const auto bound = bind_to_own_driver(mesh, std::move(driver), Precision::float32, kOneThread);
+        const auto bound = bind_to_own_driver(mesh, std::move(driver), kOneThread);
         return !bound.ok() && bound.error().code == ErrorCode::usage;
     };
     EXPECT_TRUE(refused([&](Level& d) { d.vertices.back() = Index(mesh.vertex_count()); }));
@@ -36,7 +34,7 @@ TEST(CheckedStrip, ADriverOfTheMeshesOwnVerticesHasToBeOne) {
     EXPECT_TRUE(refused([](Level& d) { d.face_offsets[1] = 4; }));
     EXPECT_TRUE(refused([](Level& d) { d.face_offsets.pop_back(); }));
     for (const auto& [what, broken] : broken_meshes()) {
-        const auto bound = bind_to_own_driver(broken, {{0, 1, 2}, {0, 3}, {0, 1, 2}}, Precision::float32, kOneThread);
+        const auto bound = bind_to_own_driver(broken, {{0, 1, 2}, {0, 3}, {0, 1, 2}}, kOneThread);
         EXPECT_TRUE(!bound.ok() && bound.error().code == ErrorCode::usage) << what;
     }
 }

@@ -49,20 +49,19 @@ TEST(Model, DamageOfMeshAndLevelsIsSeen) {
 }
 
 TEST(Model, DamageOfTheBlendCodeIsSeen) {
-    expect_all_seen(
-        stripped(kPlane, {.base = 12, .precision = Precision::int16}).model,
-        {[](Model& m) { blend(m).cells.clear(); }, [](Model& m) { blend(m).cells[0][2] = 1000; },
-         [](Model& m) { blend(m).cell_offsets.pop_back(); }, [](Model& m) { blend(m).cell_offsets.front() = 1; },
-         [](Model& m) { blend(m).cell_offsets.back() = 80; }, [](Model& m) { blend(m).cell_offsets[1] = 82; },
-         [](Model& m) { blend(m).order.pop_back(); }, [](Model& m) { blend(m).order[0] = 81; },
-         [](Model& m) { blend(m).order[0] = blend(m).order[1]; }, [](Model& m) { blend(m).u.pop_back(); },
-         [](Model& m) { blend(m).v.push_back(0); }, [](Model& m) { blend(m).u[5] = NAN; },
-         [](Model& m) { blend(m).v[5] = -1.5f; }, [](Model& m) { blend(m).offsets.pop_back(); },
-         [](Model& m) { blend(m).cell_scales.pop_back(); }, [](Model& m) { blend(m).cell_scales[0] = INFINITY; },
-         [](Model& m) {
-             blend(m).across_gap = {3, 3};
-         },
-         [](Model& m) { blend(m).facing_away = {81}; }});
+    expect_all_seen(stripped(kPlane, {.base = 12}).model,
+                    {[](Model& m) { blend(m).cells.clear(); }, [](Model& m) { blend(m).cells[0][2] = 1000; },
+                     [](Model& m) { blend(m).cell_offsets.pop_back(); },
+                     [](Model& m) { blend(m).cell_offsets.front() = 1; },
+                     [](Model& m) { blend(m).cell_offsets.back() = 80; },
+                     [](Model& m) { blend(m).cell_offsets[1] = 82; }, [](Model& m) { blend(m).order.pop_back(); },
+                     [](Model& m) { blend(m).order[0] = 81; }, [](Model& m) { blend(m).order[0] = blend(m).order[1]; },
+                     [](Model& m) { blend(m).u.pop_back(); }, [](Model& m) { blend(m).v.push_back(0); },
+                     [](Model& m) { blend(m).u[5] = NAN; }, [](Model& m) { blend(m).v[5] = -1.5f; },
+                     [](Model& m) {
+                         blend(m).across_gap = {3, 3};
+                     },
+                     [](Model& m) { blend(m).facing_away = {81}; }});
 }
 
 TEST(Model, LevelMeshesCarryWhatVerticesHave) {

@@ -142,7 +142,7 @@ TEST(Restore, OnFlatDriversHeightsGrowWithTheRootOfTheArea) {
             const Index cell = 2 * (8 * cj + ci) + (y > x);
             bonds[65 * j + i] = y > x ? Bond{cell, x, y - x} : Bond{cell, x - y, y};
         }
-    model.detail = encode_blend(mesh.positions, driver.vertices, cells, {bonds, {}, {}}, Precision::float32);
+    model.detail = encode_blend(cells, {bonds, {}, {}});
     model.levels.push_back(driver);
     ASSERT_EQ(check_model(model), "");
 
@@ -203,16 +203,13 @@ TEST(Restore, CellsOfOneToSixHundredRecords) {
             mesh.positions.emplace_back(any(random), any(random), any(random));
         }
     }
-    for (const Precision precision : {Precision::float32, Precision::int16}) {
-        Model model;
-        model.mesh = mesh;
-        model.levels.push_back({{0, 1, 2, 3}, {0, 3, 6}, {0, 1, 2, 1, 3, 2}});
-        model.detail = encode_blend(mesh.positions, model.levels[0].vertices, cells, {bonds, {}, {}}, precision);
-        ASSERT_EQ(check_model(model), "");
-        const Deformation f = affine(kTurn, kShift);
-        EXPECT_LE(distance(restored(model, pose_by(f, model)), deformed(f, mesh.positions)).max,
-                  precision == Precision::float32 ? 1e-6 : 3e-5);
-    }
+    Model model;
+    model.mesh = mesh;
+    model.levels.push_back({{0, 1, 2, 3}, {0, 3, 6}, {0, 1, 2, 1, 3, 2}});
+    model.detail = encode_blend(cells, {bonds, {}, {}});
+    ASSERT_EQ(check_model(model), "");
+    const Deformation f = affine(kTurn, kShift);
+    EXPECT_LE(distance(restored(model, pose_by(f, model)), deformed(f, mesh.positions)).max, 1e-6);
 }
 
 TEST(Restore, SameBytesForAnyThreads) {
@@ -273,19 +270,17 @@ static_assert(Restorable<const Model&> && Restorable<Model&>);
 static_assert(!Restorable<Model> && !Restorable<const Model>);
 
 TEST(Restorer, SetUpOnAnyThreadsGivesTheSameBytes) {
-    for (const Precision precision : {Precision::float32, Precision::int16}) {
-        Mesh mesh = make_wavy_sphere({.resolution = 60});
-        mesh.normals = {vertex_normals(mesh, mesh.positions, kOneThread), {}};
-        const Model model = strip(mesh, {.base = 300, .precision = precision}, kOneThread).value().model;
-        Pose pose = rest_pose(model);
-        for (Vec3f& p : pose.positions) p.x() += 0.2f * p.y() * p.y();
-        const auto restored = [&](const RunContext& context) {
-            return Restorer::create(model, {}, context).value().mesh(pose, kOneThread).value();
-        };
-        const Mesh one = restored(kOneThread), all = restored(kAllThreads);
-        EXPECT_EQ(one.positions, all.positions);
-        EXPECT_EQ(one.normals.values, all.normals.values);
-    }
+    Mesh mesh = make_wavy_sphere({.resolution = 60});
+    mesh.normals = {vertex_normals(mesh, mesh.positions, kOneThread), {}};
+    const Model model = strip(mesh, {.base = 300}, kOneThread).value().model;
+    Pose pose = rest_pose(model);
+    for (Vec3f& p : pose.positions) p.x() += 0.2f * p.y() * p.y();
+    const auto restored = [&](const RunContext& context) {
+        return Restorer::create(model, {}, context).value().mesh(pose, kOneThread).value();
+    };
+    const Mesh one = restored(kOneThread), all = restored(kAllThreads);
+    EXPECT_EQ(one.positions, all.positions);
+    EXPECT_EQ(one.normals.values, all.normals.values);
 }
 
 TEST(Restorer, NormalsHaveLengthOneUnderAnyScale) {

@@ -12,8 +12,6 @@ using namespace filigree_test;
 
 namespace {
 
-constexpr Precision kPrecisions[] = {Precision::float32, Precision::int16};
-
 Mesh points_only(std::size_t count) {
     Mesh mesh;
     std::mt19937 random(1);
@@ -65,45 +63,38 @@ Mesh scaled(Mesh mesh, float by) {
 } // namespace
 
 TEST(Strip, ShapesComeBack) {
-    for (const auto& [name, mesh] : all_shapes())
-        for (const Precision precision : kPrecisions) {
-            const Model model = stripped(mesh, {.precision = precision}).model;
-            EXPECT_LE(distance(restored(model, rest_pose(model)), mesh.positions).max, 1e-6)
-                << name << ' ' << int(precision);
-            EXPECT_LT(model.driver().vertices.size(), mesh.vertex_count());
-        }
+    for (const auto& [name, mesh] : all_shapes()) {
+        const Model model = stripped(mesh, {}).model;
+        EXPECT_LE(distance(restored(model, rest_pose(model)), mesh.positions).max, 1e-6) << name;
+        EXPECT_LT(model.driver().vertices.size(), mesh.vertex_count());
+    }
 }
 
 TEST(Strip, TinyMeshesComeBackFromEveryBase) {
     for (const auto& [name, mesh] : tiny_meshes())
-        for (const Precision precision : kPrecisions)
-            for (const std::size_t base : {3u, 4u, 100u}) {
-                const Model model = stripped(mesh, {.base = base, .precision = precision}).model;
-                ASSERT_FALSE(model.levels.empty()) << name;
-                const double most =
-                    precision == Precision::float32 ? 1e-6 : 3e-5; // a driver of three: half the size away
-                EXPECT_LE(distance(restored(model, rest_pose(model)), mesh.positions).max, most)
-                    << name << ' ' << int(precision) << ' ' << base;
-                // And something finite wherever the driver goes.
-                Pose pose = rest_pose(model);
-                for (Vec3f& p : pose.positions) p = Vec3f(p.y() * p.y(), p.x() - p.z(), 0);
-                for (const Vec3f& p : restored(model, pose)) ASSERT_TRUE(p.allFinite()) << name;
-            }
+        for (const std::size_t base : {3u, 4u, 100u}) {
+            const Model model = stripped(mesh, {.base = base}).model;
+            ASSERT_FALSE(model.levels.empty()) << name;
+            EXPECT_LE(distance(restored(model, rest_pose(model)), mesh.positions).max, 1e-6) << name << ' ' << base;
+            // And something finite wherever the driver goes.
+            Pose pose = rest_pose(model);
+            for (Vec3f& p : pose.positions) p = Vec3f(p.y() * p.y(), p.x() - p.z(), 0);
+            for (const Vec3f& p : restored(model, pose)) ASSERT_TRUE(p.allFinite()) << name;
+        }
 }
 
 TEST(Strip, ExtremeSizesComeBack) {
     for (const float size : {1e-42f, 1e-38f, 1e-20f, 1e-10f, 1e10f, 1e30f, 1e38f})
-        for (const Precision precision : kPrecisions)
-            for (const Mesh& shape : {make_wavy_cube({.resolution = 16}), points_only(100)}) {
-                const Mesh mesh = scaled(shape, size);
-                const Model model = stripped(mesh, {.precision = precision}).model;
-                // The smallest floats are steps of 1.4e-45, up to one of which is lost on each axis.
-                const double steps =
-                    2 * double(std::numeric_limits<float>::denorm_min()) / bounds(mesh.positions).diagonal();
-                const double most = shape.face_count() > 0 ? 2e-6 : 1e-5; // far from their drivers: points the most
-                EXPECT_LE(distance(restored(model, rest_pose(model)), mesh.positions).max, most + steps)
-                    << size << ' ' << int(precision) << ' ' << shape.face_count();
-            }
+        for (const Mesh& shape : {make_wavy_cube({.resolution = 16}), points_only(100)}) {
+            const Mesh mesh = scaled(shape, size);
+            const Model model = stripped(mesh, {}).model;
+            // The smallest floats are steps of 1.4e-45, up to one of which is lost on each axis.
+            const double steps =
+                2 * double(std::numeric_limits<float>::denorm_min()) / bounds(mesh.positions).diagonal();
+            const double most = shape.face_count() > 0 ? 2e-6 : 1e-5; // far from their drivers: points the most
+            EXPECT_LE(distance(restored(model, rest_pose(model)), mesh.positions).max, most + steps)
+                << size << ' ' << shape.face_count();
+        }
 }
 
 /// A vertex that no face uses may be anywhere: it has a place, and the others keep their digits.
@@ -224,18 +215,15 @@ TEST(Strip, ALevelThatRemovesNothingIsNotKept) {
 
 TEST(Strip, SameBytesForAnyThreads) {
     FILIGREE_NEEDS_TWO_THREADS();
-    for (const Precision precision : kPrecisions) {
-        const Mesh mesh = make_wavy_cube({.resolution = 80});
-        const StripOptions options{.base = 500, .precision = precision};
-        const Model one = stripped(mesh, options).model, two = stripped(mesh, options, RunContext(2)).model;
-        const BlendDetail &a = one.detail, &b = two.detail;
-        EXPECT_EQ(a.order, b.order);
-        EXPECT_EQ(a.cells, b.cells);
-        EXPECT_EQ(a.u, b.u);
-        EXPECT_EQ(a.v, b.v);
-        EXPECT_EQ(a.offsets, b.offsets);
-        EXPECT_TRUE(same_bytes(restored(one, rest_pose(one)), restored(two, rest_pose(two), {}, RunContext(2))));
-    }
+    const Mesh mesh = make_wavy_cube({.resolution = 80});
+    const StripOptions options{.base = 500};
+    const Model one = stripped(mesh, options).model, two = stripped(mesh, options, RunContext(2)).model;
+    const BlendDetail &a = one.detail, &b = two.detail;
+    EXPECT_EQ(a.order, b.order);
+    EXPECT_EQ(a.cells, b.cells);
+    EXPECT_EQ(a.u, b.u);
+    EXPECT_EQ(a.v, b.v);
+    EXPECT_TRUE(same_bytes(restored(one, rest_pose(one)), restored(two, rest_pose(two), {}, RunContext(2))));
 }
 
 TEST(Strip, OptionsThatMakeNoSenseAreRefused) {

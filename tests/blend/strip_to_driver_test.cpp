@@ -15,7 +15,7 @@ using namespace filigree_test;
 namespace {
 
 Stripped bound(Mesh mesh, const Mesh& driver, const RunContext& context = kOneThread) {
-    Result<Stripped> result = strip_to_driver(std::move(mesh), driver, Precision::float32, context);
+    Result<Stripped> result = strip_to_driver(std::move(mesh), driver, context);
     EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().message);
     if (!result.ok()) return {};
     EXPECT_EQ(check_model(result->model), "");
@@ -76,25 +76,23 @@ TEST(StripToDriver, WhatIsRestoredHasTheMeshsOwnVerticesAlone) {
     mesh.colors.assign(mesh.vertex_count(), Vec4f(1, 0, 0, 1));
     mesh.scalars.push_back({"weight", std::vector<float>(mesh.vertex_count(), 2)});
     const Mesh driver = smooth_ball(8);
-    for (const Precision precision : {Precision::float32, Precision::int16}) {
-        const Model model = strip_to_driver(mesh, driver, precision, kOneThread)->model;
-        EXPECT_EQ(model.vertex_count(), mesh.vertex_count());
-        EXPECT_EQ(level_counts(model, 1).vertices, mesh.vertex_count());
-        EXPECT_EQ(level_counts(model, 0).vertices, driver.vertex_count());
-        EXPECT_EQ(vertex_levels(model, 1), std::vector<float>(mesh.vertex_count(), 1));
-        EXPECT_EQ(vertex_errors(model, std::vector<float>(driver.vertex_count(), 1)).size(), mesh.vertex_count());
-        EXPECT_EQ(make_skin(model, 1, 3, false)->positions.size(), mesh.vertex_count());
-        const Restorer restorer = *Restorer::create(model, {}, kOneThread);
-        EXPECT_EQ(restorer.vertex_count(), mesh.vertex_count());
-        for (const Mesh& finest : {level_mesh(model, 1), *restorer.mesh(rest_pose(model), kOneThread)}) {
-            EXPECT_LT(distance(finest.positions, mesh.positions).max, precision == Precision::int16 ? 1e-3 : 3e-7);
-            EXPECT_EQ(finest.corners, mesh.corners);
-            EXPECT_EQ(finest.normals.values.size(), mesh.vertex_count());
-            EXPECT_EQ(finest.uvs.values, mesh.uvs.values);
-            EXPECT_EQ(finest.colors, mesh.colors);
-            EXPECT_EQ(finest.scalars[0].values, mesh.scalars[0].values);
-            EXPECT_EQ(check_mesh(finest), "");
-        }
+    const Model model = strip_to_driver(mesh, driver, kOneThread)->model;
+    EXPECT_EQ(model.vertex_count(), mesh.vertex_count());
+    EXPECT_EQ(level_counts(model, 1).vertices, mesh.vertex_count());
+    EXPECT_EQ(level_counts(model, 0).vertices, driver.vertex_count());
+    EXPECT_EQ(vertex_levels(model, 1), std::vector<float>(mesh.vertex_count(), 1));
+    EXPECT_EQ(vertex_errors(model, std::vector<float>(driver.vertex_count(), 1)).size(), mesh.vertex_count());
+    EXPECT_EQ(make_skin(model, 1, 3, false)->positions.size(), mesh.vertex_count());
+    const Restorer restorer = *Restorer::create(model, {}, kOneThread);
+    EXPECT_EQ(restorer.vertex_count(), mesh.vertex_count());
+    for (const Mesh& finest : {level_mesh(model, 1), *restorer.mesh(rest_pose(model), kOneThread)}) {
+        EXPECT_LT(distance(finest.positions, mesh.positions).max, 3e-7);
+        EXPECT_EQ(finest.corners, mesh.corners);
+        EXPECT_EQ(finest.normals.values.size(), mesh.vertex_count());
+        EXPECT_EQ(finest.uvs.values, mesh.uvs.values);
+        EXPECT_EQ(finest.colors, mesh.colors);
+        EXPECT_EQ(finest.scalars[0].values, mesh.scalars[0].values);
+        EXPECT_EQ(check_mesh(finest), "");
     }
 }
 
@@ -186,7 +184,7 @@ TEST(StripToDriver, SameBytesForAnyThreads) {
 TEST(StripToDriver, NothingIsRefusedWithASentence) {
     const Mesh mesh = make_wavy_plane({.resolution = 8});
     const auto code = [](const Mesh& m, const Mesh& driver, const RunContext& context) {
-        const Result<Stripped> result = strip_to_driver(m, driver, Precision::int16, context);
+        const Result<Stripped> result = strip_to_driver(m, driver, context);
         return result.ok() ? std::optional<ErrorCode>() : result.error().code;
     };
     EXPECT_EQ(code(Mesh{}, mesh, kOneThread), ErrorCode::unsuitable);

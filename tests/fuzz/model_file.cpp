@@ -48,17 +48,15 @@ namespace filigree_fuzz {
 std::vector<std::string> seeds() {
     const Mesh mesh = make_wavy_sphere({.resolution = 3});
     std::vector<std::string> all;
-    for (const Precision precision : {Precision::float32, Precision::int16}) {
-        const Model model = strip(mesh, {.base = 12, .precision = precision}, kContext).value().model;
-        all.push_back(write_model(model));
-        PoseSequence poses;
-        poses.frames = {rest_pose(model), rest_pose(model)};
-        all.push_back(write_model(model, poses));
-        all.push_back(lossless_file(model, poses));
-        all.push_back(coded_file(model, {}));
-        all.push_back(coded_file(model, {.bits = 10, .surface = true, .keep_order = true}));
-        all.push_back(coded_file(model, {.levels = true}));
-    }
+    const Model model = strip(mesh, {.base = 12}, kContext).value().model;
+    all.push_back(write_model(model));
+    PoseSequence poses;
+    poses.frames = {rest_pose(model), rest_pose(model)};
+    all.push_back(write_model(model, poses));
+    all.push_back(lossless_file(model, poses));
+    all.push_back(coded_file(model, {}));
+    all.push_back(coded_file(model, {.bits = 10, .surface = true, .keep_order = true}));
+    all.push_back(coded_file(model, {.levels = true}));
     const Mesh cube = make_wavy_cube({.resolution = 4});
     all.push_back(write_reference_model(strip_to_reference(cube, {}, kContext).value()));
     all.push_back(write_model(strip(cube, {.base = 20, .reorder = true}, kContext).value().model));

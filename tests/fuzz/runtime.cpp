@@ -23,18 +23,14 @@ std::vector<std::string> seeds() {
     Mesh points;
     points.positions = mesh.positions;
     std::vector<std::string> all;
-    for (const Precision precision : {Precision::float32, Precision::int16}) {
-        for (const Mesh* each : std::initializer_list<const Mesh*>{&mesh, &smooth, &faceted, &points}) {
-            const Model model = strip(*each, {.base = 12, .precision = precision}, kContext).value().model;
-            PoseSequence poses;
-            poses.frames = {rest_pose(model), rest_pose(model)};
-            all.push_back(write_model(model, each == &mesh ? poses : PoseSequence()));
-        }
-        all.push_back(
-            write_model(strip_to_driver(faceted, make_wavy_cube({.resolution = 1, .amplitude = 0}), precision, kContext)
-                            .value()
-                            .model));
+    for (const Mesh* each : std::initializer_list<const Mesh*>{&mesh, &smooth, &faceted, &points}) {
+        const Model model = strip(*each, {.base = 12}, kContext).value().model;
+        PoseSequence poses;
+        poses.frames = {rest_pose(model), rest_pose(model)};
+        all.push_back(write_model(model, each == &mesh ? poses : PoseSequence()));
     }
+    all.push_back(write_model(
+        strip_to_driver(faceted, make_wavy_cube({.resolution = 1, .amplitude = 0}), kContext).value().model));
     return all;
 }
 

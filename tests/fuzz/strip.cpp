@@ -20,10 +20,7 @@ namespace {
 const RunContext kTwoThreads(2);
 
 /// As far off as the rounding of records may be, in model units.
-double allowed(const Model& model, double diagonal) {
-    const auto& detail = model.detail;
-    return (detail.precision == Precision::int16 ? 2e-4 : 2e-5) * (1 + diagonal);
-}
+double allowed(double diagonal) { return 2e-5 * (1 + diagonal); }
 
 } // namespace
 
@@ -31,9 +28,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     Bytes bytes(data, size);
     const unsigned options = bytes.byte();
     const Mesh mesh = mesh_of(bytes);
-    const StripOptions how{.base = 3 + options % 16,
-                           .precision = options & 32 ? Precision::int16 : Precision::float32,
-                           .reorder = (options & 64) != 0};
+    const StripOptions how{.base = 3 + options % 16, .reorder = (options & 64) != 0};
     const Result<Stripped> stripped = strip(mesh, how, kContext);
     if (!is_sound(stripped)) return 0;
     const Model& model = stripped->model;
@@ -45,7 +40,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
     const Restorer restorer = Restorer::create(model, {}, kContext).value();
     Pose pose = rest_pose(model);
-    const double most = allowed(model, world_bounds(mesh).diagonal());
+    const double most = allowed(world_bounds(mesh).diagonal());
     const std::vector<Vec3f> rest = restorer.positions(pose, kContext).value();
     for (std::size_t v = 0; v < rest.size(); ++v)
         require((rest[v] - model.mesh.positions[v]).norm() <= most, "the rest pose gives the mesh");

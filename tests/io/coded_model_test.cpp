@@ -15,7 +15,7 @@ namespace {
 
 Model bound_elsewhere() {
     const Mesh ball = make_wavy_sphere({.resolution = 8, .amplitude = 0});
-    return strip_to_driver(make_wavy_sphere({.resolution = 48}), ball, Precision::float32, kTwoThreads).value().model;
+    return strip_to_driver(make_wavy_sphere({.resolution = 48}), ball, kTwoThreads).value().model;
 }
 
 std::filesystem::path packed_path() {

@@ -61,7 +61,6 @@ TEST(LosslessModel, EveryKindComesBackByteForByte) {
     expect_same(model, {});
     expect_same(model, bending(model, 70, true));
     expect_same(model, bending(model, 3, false));
-    expect_same(strip(sphere, {.base = 40, .precision = Precision::int16}, kTwoThreads)->model, {});
     expect_same(strip(cube, {.base = 30, .reorder = true}, kTwoThreads)->model, {});
     for (const Mesh& mesh : {filigree_test::make_vertex_attribute_mesh(), filigree_test::make_corner_attribute_mesh(),
                              filigree_test::make_far_mesh()})
@@ -84,7 +83,6 @@ TEST(LosslessModel, SizesStay) {
     };
     expect_coded_size(size_of({.base = 100}), 278016, "places and details");
     expect_coded_size(size_of({.base = 100}, 20), 299992, "with 20 poses");
-    expect_coded_size(size_of({.base = 100, .precision = Precision::int16}), 184488, "details of 16 bits");
     expect_coded_size(size_of({.base = 100, .reorder = true}), 343296, "in the order of places");
     mesh.normals.values = vertex_normals(mesh, mesh.positions, kTwoThreads);
     for (const Vec3f& p : mesh.positions) {

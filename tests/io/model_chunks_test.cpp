@@ -19,10 +19,10 @@ namespace fs = std::filesystem;
 
 namespace {
 
-Model model_of(Precision precision, const Vec3d& origin = Vec3d::Zero()) {
+Model model_of(const Vec3d& origin = Vec3d::Zero()) {
     Mesh mesh = make_wavy_cube({.resolution = 220}); // two chunks
     mesh.origin = origin;
-    return std::move(strip(mesh, {.base = 200, .precision = precision}, kTwoThreads)->model);
+    return std::move(strip(mesh, {.base = 200}, kTwoThreads)->model);
 }
 
 PoseSequence bent_poses(const Model& model, bool with_gradients) {
@@ -74,28 +74,26 @@ protected:
 };
 
 TEST_F(ModelChunksTest, RestoreTheSameBytesAsTheWhole) {
-    for (const Precision precision : {Precision::float32, Precision::int16})
-        for (const bool with_gradients : {false, true}) {
-            const Model model = model_of(precision);
-            const PoseSequence poses = bent_poses(model, with_gradients);
-            const Result<ModelChunks> chunks = open(model);
-            ASSERT_TRUE(chunks.ok()) << chunks.error().message;
-            EXPECT_EQ(chunks->count(), 2u);
-            EXPECT_EQ(chunks->vertex_count(), model.mesh.vertex_count());
-            const Mesh rest = read_model(path("m.fil"), kTwoThreads)->mesh; // int16 records round positions
-            for (std::size_t k = 0; k < 2; ++k) {
-                const Box box = chunks->box(k);
-                Box own;
-                for (std::size_t v = chunks->first_vertex(k); v < chunks->first_vertex(k + 1); ++v)
-                    own.extend(rest.positions[v].cast<double>());
-                EXPECT_EQ(box.min, own.min);
-                EXPECT_EQ(box.max, own.max);
-            }
-            const auto written = write_restored_chunks(*chunks, frames_of(poses), {}, path("chunks.pc2"), kTwoThreads);
-            ASSERT_TRUE(written.ok()) << written.error().message;
-            EXPECT_TRUE(written->empty());
-            EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses));
+    for (const bool with_gradients : {false, true}) {
+        const Model model = model_of();
+        const PoseSequence poses = bent_poses(model, with_gradients);
+        const Result<ModelChunks> chunks = open(model);
+        ASSERT_TRUE(chunks.ok()) << chunks.error().message;
+        EXPECT_EQ(chunks->count(), 2u);
+        EXPECT_EQ(chunks->vertex_count(), model.mesh.vertex_count());
+        for (std::size_t k = 0; k < 2; ++k) {
+            const Box box = chunks->box(k);
+            Box own;
+            for (std::size_t v = chunks->first_vertex(k); v < chunks->first_vertex(k + 1); ++v)
+                own.extend(model.mesh.positions[v].cast<double>());
+            EXPECT_EQ(box.min, own.min);
+            EXPECT_EQ(box.max, own.max);
         }
+        const auto written = write_restored_chunks(*chunks, frames_of(poses), {}, path("chunks.pc2"), kTwoThreads);
+        ASSERT_TRUE(written.ok()) << written.error().message;
+        EXPECT_TRUE(written->empty());
+        EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses));
+    }
 }
 
 /// One whose vertices end behind a chunk's beginning, and one whose mesh ends there while the driver's vertices go on.
@@ -104,23 +102,22 @@ TEST_F(ModelChunksTest, HaveNoVerticesOfADriverMadeElsewhere) {
     Mesh even = make_wavy_cube({.resolution = 180});
     ASSERT_LT(even.vertex_count(), std::size_t{262'144});
     even.positions.resize(262'144 - 10, Vec3f(0.1f, 0.2f, 0.3f)); // vertices that no face has
-    for (const Mesh& mesh : {make_wavy_cube({.resolution = 220}), even})
-        for (const Precision precision : {Precision::float32, Precision::int16}) {
-            const Model model = strip_to_driver(mesh, ball, precision, kTwoThreads)->model;
-            const PoseSequence poses = bent_poses(model, false);
-            const Result<ModelChunks> chunks = open(model);
-            ASSERT_TRUE(chunks.ok()) << chunks.error().message;
-            EXPECT_EQ(chunks->vertex_count(), mesh.vertex_count());
-            const ModelOutline outline = *read_model_outline(*FileReader::open(path("m.fil")), "m.fil", kTwoThreads);
-            EXPECT_EQ(outline.levels.back().vertices, mesh.vertex_count());
-            ASSERT_TRUE(write_restored_chunks(*chunks, frames_of(poses), {}, path("chunks.pc2"), kTwoThreads).ok());
-            EXPECT_EQ(fs::file_size(path("chunks.pc2")), 32 + 3 * 12 * mesh.vertex_count());
-            EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses));
-        }
+    for (const Mesh& mesh : {make_wavy_cube({.resolution = 220}), even}) {
+        const Model model = strip_to_driver(mesh, ball, kTwoThreads)->model;
+        const PoseSequence poses = bent_poses(model, false);
+        const Result<ModelChunks> chunks = open(model);
+        ASSERT_TRUE(chunks.ok()) << chunks.error().message;
+        EXPECT_EQ(chunks->vertex_count(), mesh.vertex_count());
+        const ModelOutline outline = *read_model_outline(*FileReader::open(path("m.fil")), "m.fil", kTwoThreads);
+        EXPECT_EQ(outline.levels.back().vertices, mesh.vertex_count());
+        ASSERT_TRUE(write_restored_chunks(*chunks, frames_of(poses), {}, path("chunks.pc2"), kTwoThreads).ok());
+        EXPECT_EQ(fs::file_size(path("chunks.pc2")), 32 + 3 * 12 * mesh.vertex_count());
+        EXPECT_TRUE(bytes_of(path("chunks.pc2")) == whole(poses));
+    }
 }
 
 TEST_F(ModelChunksTest, AreSharedByProcesses) {
-    const Model model = model_of(Precision::float32);
+    const Model model = model_of();
     const PoseSequence poses = bent_poses(model, false);
     const Result<ModelChunks> chunks = open(model);
     for (std::size_t part = 1; part <= 2; ++part) {
@@ -133,7 +130,7 @@ TEST_F(ModelChunksTest, AreSharedByProcesses) {
 }
 
 TEST_F(ModelChunksTest, FarFromTheOriginLostDigitsAreSaid) {
-    const Model model = model_of(Precision::float32, {1e6, 0, 0});
+    const Model model = model_of({1e6, 0, 0});
     const PoseSequence poses = bent_poses(model, false);
     const auto written = write_restored_chunks(*open(model), frames_of(poses), {}, path("chunks.pc2"), kTwoThreads);
     ASSERT_TRUE(written.ok());
@@ -142,7 +139,7 @@ TEST_F(ModelChunksTest, FarFromTheOriginLostDigitsAreSaid) {
 }
 
 TEST_F(ModelChunksTest, DamageIsSeenWhereItIsRead) {
-    const Model model = model_of(Precision::float32);
+    const Model model = model_of();
     const PoseSequence poses = bent_poses(model, false);
     ASSERT_TRUE(open(model).ok());
     std::string bytes = bytes_of(path("m.fil"));
@@ -166,7 +163,7 @@ TEST_F(ModelChunksTest, WhatHasNoneIsRefused) {
         write_reference_model(*strip_to_reference(make_wavy_cube({.resolution = 8}), {}, kTwoThreads));
     EXPECT_EQ(ModelChunks::open(FileReader(std::string_view(reference)), "a", kTwoThreads).error().code,
               ErrorCode::unsuitable);
-    const Model model = model_of(Precision::float32);
+    const Model model = model_of();
     const Result<ModelChunks> chunks = open(model);
     const PoseSequence poses = bent_poses(model, false);
     const auto code = [&](const PoseSequence& given, const RestoreOptions& options, const char* name) {

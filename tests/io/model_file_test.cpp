@@ -46,7 +46,6 @@ std::vector<Model> small_models() {
     }
     decorated.scalars = {{"quality", std::vector<float>(decorated.vertex_count(), 0.5f)}};
     models.push_back(stripped(decorated, {.base = 9}));
-    models.push_back(stripped(decorated, {.base = 9, .precision = Precision::int16}));
     models.push_back(stripped(make_corner_attribute_mesh(), {.base = 4}));
     return models;
 }
@@ -177,25 +176,24 @@ TEST(ModelFile, ComesBackToTheByte) {
         ASSERT_EQ(back->levels.size(), model.levels.size());
         EXPECT_TRUE(same_bytes(driver_positions(*back), driver_positions(model)));
         EXPECT_TRUE(same_bytes(bent(*back), bent(model)));
-        if (model.detail.precision == Precision::float32) {
-            EXPECT_TRUE(same_bytes(back->mesh.positions, model.mesh.positions));
-        }
+        EXPECT_TRUE(same_bytes(back->mesh.positions, model.mesh.positions));
     }
 }
 
-TEST(ModelFile, Int16IsHalfTheBytesAndCloseToTheMesh) {
-    const Mesh mesh = make_wavy_cube({.resolution = 48});
-    const Model exact = stripped(mesh, {.base = 300}),
-                rounded = stripped(mesh, {.base = 300, .precision = Precision::int16});
-    EXPECT_LT(write_model(rounded).size(), write_model(exact).size());
-    const Result<Model> back = read(write_model(rounded));
-    ASSERT_TRUE(back.ok());
-    const BlendDetail& detail = back->detail;
-    for (std::size_t c = 0; c < detail.cells.size(); ++c)
-        for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
-            const Vec3f off = back->mesh.positions[detail.order[r]] - mesh.positions[detail.order[r]];
-            ASSERT_LE(off.lpNorm<Eigen::Infinity>(), 0.5f * detail.cell_scales[c] + 1e-7f); // half a step
-        }
+/// Programs before 0.1.0 wrote records of 16 bits on demand.
+TEST(ModelFile, Int16RecordsAreRefusedWithAWayOut) {
+    Patcher patcher(write_model(small_models()[0]));
+    patcher.set("bl.prec", 0, 1u);
+    const std::string bytes = patcher.bytes();
+    const FileReader file{std::string_view(bytes)};
+    const std::vector<Error> errors = {read(bytes).error(), read_model_outline(file, "a.fil", kOneThread).error(),
+                                       read_model_level(file, 0, "a.fil", kOneThread).error(),
+                                       read_model_level(file, 1, "a.fil", kOneThread).error()};
+    for (const Error& error : errors) {
+        EXPECT_EQ(error.code, ErrorCode::unsuitable);
+        EXPECT_EQ(error.message, "a.fil has int16 records, which are no longer read; strip the mesh again, and run "
+                                 "`filigree pack --profile runtime` for a small file.");
+    }
 }
 
 TEST(ModelFile, IsWhatTheManualShows) {
@@ -312,7 +310,7 @@ TEST(ModelFile, NothingMissingIsRestored) {
 }
 
 TEST(ModelFile, HostileNumbers) {
-    const std::string blend = write_model(small_models()[0]), rounded = write_model(small_models()[1]);
+    const std::string blend = write_model(small_models()[0]);
     const auto refuses = [](const std::string& bytes, std::string_view name, auto value, std::size_t item = 1) {
         Patcher patcher(bytes);
         patcher.set(name, item, value);
@@ -338,23 +336,7 @@ TEST(ModelFile, HostileNumbers) {
     for (const int record : {49, 32767, 32768, 65535}) refuses(blend, "bl.from", static_cast<std::uint16_t>(record));
     refuses(blend, "lev.vert", Patcher(blend).get<Index>("lev.vert", 0)); // not ascending
 
-    refuses(rounded, "bl.scale", NAN);
-    refuses(rounded, "drv.pos", NAN);
-    refuses(rounded, "mesh.num", std::uint64_t{1} << 60, 0);
-    refuses(rounded, "mesh.num", std::uint64_t{48}, 0);
-    refuses(rounded, "bl.prec", 0u, 0);
-    refuses(rounded, "bl.u16", std::int16_t{-32768});
-}
-
-TEST(ModelFile, ADriverSectionInAFloatModelIsNoReasonToReadPastItsEnd) {
-    Patcher patcher(write_model(small_models()[0]));
-    patcher.rename("col.val", "drv.pos"); // items of another size
-    EXPECT_NE(error_of(patcher.bytes()), "");
-    Model model = small_models()[0]; // and of the right size, by way of a scalar
-    model.mesh.normals.values.resize(model.driver().vertices.size());
-    Patcher again(write_model(model));
-    again.rename("nrm.val", "drv.pos");
-    EXPECT_NE(error_of(again.bytes()), "");
+    refuses(blend, "mesh.num", std::uint64_t{1} << 60, 0);
 }
 
 /// What is read in part is sound or refused, like the whole.
@@ -416,23 +398,20 @@ bool same_mesh(const Mesh& a, const Mesh& b) {
 
 bool same_detail(const BlendDetail& a, const BlendDetail& b) {
     return a.cells == b.cells && a.cell_offsets == b.cell_offsets && a.order == b.order && a.u == b.u && a.v == b.v &&
-           a.precision == b.precision && a.offsets == b.offsets && a.cell_scales == b.cell_scales &&
            a.across_gap == b.across_gap && a.facing_away == b.facing_away;
 }
 
 TEST(ModelFile, ManyChunksComeBack) {
-    for (const Precision precision : {Precision::float32, Precision::int16}) {
-        const Model written = stripped(make_wavy_cube({.resolution = 220}), {.base = 200, .precision = precision});
-        ASSERT_GT(written.mesh.vertex_count(), std::size_t{1} << 18);
-        const std::string bytes = write_model(written);
-        const Result<Model> model = read(bytes);
-        ASSERT_TRUE(model.ok()) << model.error().message;
-        EXPECT_TRUE(same_detail(model->detail, written.detail));
-        EXPECT_EQ(write_model(*model), bytes);
-        const FileReader file{std::string_view(bytes)};
-        for (unsigned k = 0; k <= model->finest_level(); ++k)
-            EXPECT_TRUE(same_mesh(*read_model_level(file, k, "a.fil", kOneThread), level_mesh(*model, k))) << k;
-    }
+    const Model written = stripped(make_wavy_cube({.resolution = 220}), {.base = 200});
+    ASSERT_GT(written.mesh.vertex_count(), std::size_t{1} << 18);
+    const std::string bytes = write_model(written);
+    const Result<Model> model = read(bytes);
+    ASSERT_TRUE(model.ok()) << model.error().message;
+    EXPECT_TRUE(same_detail(model->detail, written.detail));
+    EXPECT_EQ(write_model(*model), bytes);
+    const FileReader file{std::string_view(bytes)};
+    for (unsigned k = 0; k <= model->finest_level(); ++k)
+        EXPECT_TRUE(same_mesh(*read_model_level(file, k, "a.fil", kOneThread), level_mesh(*model, k))) << k;
 }
 
 /// A file of the reference code: the same mesh and levels, and detail that read_model does not take.
@@ -482,7 +461,7 @@ TEST(ModelFile, ReferenceModelsHaveTheirOwnReader) {
 TEST(ModelFile, ALevelIsReadAlone) {
     for (const Model& written : small_models()) {
         const std::string bytes = write_model(written);
-        const Model model = *read(bytes); // int16 records round positions
+        const Model model = *read(bytes);
         const FileReader file{std::string_view(bytes)};
         for (unsigned k = 0; k <= model.finest_level(); ++k) {
             const Result<Mesh> level = read_model_level(file, k, "a.fil", kOneThread);
@@ -510,7 +489,6 @@ TEST(ModelFile, AnOutlineSaysWhatTheModelIs) {
         EXPECT_EQ(outline->bytes, bytes.size());
         EXPECT_EQ(outline->frames, poses.frames.size());
         EXPECT_EQ(outline->frames_per_second, poses.frames.empty() ? 0 : 25);
-        EXPECT_EQ(outline->precision, model.detail.precision);
         EXPECT_EQ(outline->facing_away, model.detail.facing_away);
     }
 }

@@ -115,20 +115,16 @@ void expect_same(const Model& model, const Pose& pose, const RestoreOptions& opt
     EXPECT_LT(distance(again.positions, expected->positions).max, 2e-6) << "level " << level;
 }
 
-constexpr Precision kPrecisions[] = {Precision::float32, Precision::int16};
-
 } // namespace
 
 TEST_F(GpuRestore, IsTheCpuOnEveryShapePoseAndLevel) {
-    for (const Precision precision : kPrecisions)
-        for (const Mesh& mesh : {make_wavy_cube({.resolution = 24}), make_wavy_sphere({.resolution = 24}),
-                                 make_wavy_plane({.resolution = 40})}) {
-            const Model model = stripped(with_normals(mesh), {.levels = 3, .precision = precision}).model;
-            const Pose bent = bent_and_twisted(model);
-            for (const Pose& pose : {rest_pose(model), bent, without_gradients(bent), mirrored(model)})
-                for (unsigned level = 0; level <= model.finest_level(); ++level)
-                    expect_same(model, pose, {.level = level});
-        }
+    for (const Mesh& mesh : {make_wavy_cube({.resolution = 24}), make_wavy_sphere({.resolution = 24}),
+                             make_wavy_plane({.resolution = 40})}) {
+        const Model model = stripped(with_normals(mesh), {.levels = 3}).model;
+        const Pose bent = bent_and_twisted(model);
+        for (const Pose& pose : {rest_pose(model), bent, without_gradients(bent), mirrored(model)})
+            for (unsigned level = 0; level <= model.finest_level(); ++level) expect_same(model, pose, {.level = level});
+    }
 }
 
 TEST_F(GpuRestore, IsTheCpuOnTheKoala) {
@@ -137,73 +133,64 @@ TEST_F(GpuRestore, IsTheCpuOnTheKoala) {
     Result<MeshFile> file = read_mesh(path, kOneThread);
     ASSERT_TRUE(file.ok()) << file.error().message;
     const Mesh koala = with_normals(std::move(file->mesh));
-    for (const Precision precision : kPrecisions) {
-        const Model model = stripped(koala, {.precision = precision}).model;
-        expect_same(model, bent_and_twisted(model));
-    }
+    const Model model = stripped(koala, {}).model;
+    expect_same(model, bent_and_twisted(model));
 }
 
-/// The 16 bits that an int16 record has for its cell begin again every 65,536 records; here nearly each has its own.
-TEST_F(GpuRestore, IsTheCpuAcrossBlocksOfRecords) {
+/// Nearly each record has a cell of its own.
+TEST_F(GpuRestore, IsTheCpuOnLargeDrivers) {
     const Mesh mesh = with_normals(make_wavy_cube({.resolution = 128}));
-    for (const Precision precision : kPrecisions) {
-        const Model model = stripped(mesh, {.base = 75000, .precision = precision}).model;
-        expect_same(model, bent_and_twisted(model));
-    }
+    const Model model = stripped(mesh, {.base = 75000}).model;
+    expect_same(model, bent_and_twisted(model));
 }
 
 TEST_F(GpuRestore, RestsBeforeThePoseIsSet) {
-    for (const Precision precision : kPrecisions) {
-        const Model model = stripped(with_normals(make_torus({.resolution = 32})), {.precision = precision}).model;
-        const GpuRestorer restorer = gpu_restorer(model, all_vertices(model), model.mesh.normals.values);
-        const Result<GpuRestorer::ReadBack> found = restorer.read_back();
-        ASSERT_TRUE(found.ok());
-        EXPECT_LT(distance(found->positions, model.mesh.positions).max, precision == Precision::int16 ? 3e-5 : 2e-6);
-        EXPECT_LT(angles(found->normals, model.mesh.normals.values).max, 0.005);
-    }
+    const Model model = stripped(with_normals(make_torus({.resolution = 32})), {}).model;
+    const GpuRestorer restorer = gpu_restorer(model, all_vertices(model), model.mesh.normals.values);
+    const Result<GpuRestorer::ReadBack> found = restorer.read_back();
+    ASSERT_TRUE(found.ok());
+    EXPECT_LT(distance(found->positions, model.mesh.positions).max, 2e-6);
+    EXPECT_LT(angles(found->normals, model.mesh.normals.values).max, 0.005);
 }
 
 TEST_F(GpuRestore, ItemsMayShareAVertexAndComeInAnyOrder) {
-    for (const Precision precision : kPrecisions) {
-        const Model model = stripped(make_wavy_cube({.resolution = 16}), {.precision = precision}).model;
-        std::vector<Index> vertices;
-        std::vector<Vec3f> normals;
-        for (Index v = 0; v < 900; v += 3)
-            for (const Vec3f& normal : {Vec3f(1, 0, 0), Vec3f(0, -1, 0), Vec3f(0, 0, -1), Vec3f(0, 0, 0)}) {
-                vertices.push_back(899 - v);
-                normals.push_back(normal);
-            }
-        vertices.push_back(vertices.front());
-        normals.push_back(Vec3f(-1, 2, -3).normalized());
-        const Mat3d turn = Eigen::AngleAxisd(1, Vec3d(3, 1, 2).normalized()).toRotationMatrix();
-        const Pose pose = pose_by(affine(turn, Vec3d(1, 2, 3)), model);
-        GpuRestorer restorer = gpu_restorer(model, vertices, normals);
-        ASSERT_EQ(restorer.item_count(), vertices.size());
-        const GpuRestorer::ReadBack found = read_back(restorer, pose);
+    const Model model = stripped(make_wavy_cube({.resolution = 16}), {}).model;
+    std::vector<Index> vertices;
+    std::vector<Vec3f> normals;
+    for (Index v = 0; v < 900; v += 3)
+        for (const Vec3f& normal : {Vec3f(1, 0, 0), Vec3f(0, -1, 0), Vec3f(0, 0, -1), Vec3f(0, 0, 0)}) {
+            vertices.push_back(899 - v);
+            normals.push_back(normal);
+        }
+    vertices.push_back(vertices.front());
+    normals.push_back(Vec3f(-1, 2, -3).normalized());
+    const Mat3d turn = Eigen::AngleAxisd(1, Vec3d(3, 1, 2).normalized()).toRotationMatrix();
+    const Pose pose = pose_by(affine(turn, Vec3d(1, 2, 3)), model);
+    GpuRestorer restorer = gpu_restorer(model, vertices, normals);
+    ASSERT_EQ(restorer.item_count(), vertices.size());
+    const GpuRestorer::ReadBack found = read_back(restorer, pose);
 
-        const std::vector<Vec3f> moved = restored(model, pose);
-        std::vector<Vec3f> positions, turned;
-        for (const Index v : vertices) positions.push_back(moved[v]);
-        for (const Vec3f& n : normals) turned.push_back((turn * n.cast<double>()).cast<float>());
-        EXPECT_LT(distance(found.positions, positions).max, 2e-6);
-        EXPECT_LT(angles(found.normals, turned).max, 0.005);
+    const std::vector<Vec3f> moved = restored(model, pose);
+    std::vector<Vec3f> positions, turned;
+    for (const Index v : vertices) positions.push_back(moved[v]);
+    for (const Vec3f& n : normals) turned.push_back((turn * n.cast<double>()).cast<float>());
+    EXPECT_LT(distance(found.positions, positions).max, 2e-6);
+    EXPECT_LT(angles(found.normals, turned).max, 0.005);
 
-        std::vector<Index> places(restorer.drawn_at().begin(), restorer.drawn_at().end());
-        std::sort(places.begin(), places.end());
-        for (Index i = 0; i < places.size(); ++i) ASSERT_EQ(places[i], i);
-    }
+    std::vector<Index> places(restorer.drawn_at().begin(), restorer.drawn_at().end());
+    std::sort(places.begin(), places.end());
+    for (Index i = 0; i < places.size(); ++i) ASSERT_EQ(places[i], i);
 }
 
 TEST_F(GpuRestore, SizesFarFromOne) {
-    for (const double size : {1e-20, 1e-3, 1e6, 1e20})
-        for (const Precision precision : kPrecisions) {
-            Mesh mesh = with_normals(make_wavy_cube({.resolution = 16}));
-            for (Vec3f& p : mesh.positions) p = (size * p.cast<double>()).cast<float>();
-            const Model model = stripped(std::move(mesh), {.precision = precision}).model;
-            const Mat3d turn = Eigen::AngleAxisd(1, Vec3d(3, 1, 2).normalized()).toRotationMatrix();
-            expect_same(model, pose_by(affine(turn, size * Vec3d(1, 2, 3)), model));
-            expect_same(model, without_gradients(pose_by(affine(turn, size * Vec3d(1, 2, 3)), model)));
-        }
+    for (const double size : {1e-20, 1e-3, 1e6, 1e20}) {
+        Mesh mesh = with_normals(make_wavy_cube({.resolution = 16}));
+        for (Vec3f& p : mesh.positions) p = (size * p.cast<double>()).cast<float>();
+        const Model model = stripped(std::move(mesh), {}).model;
+        const Mat3d turn = Eigen::AngleAxisd(1, Vec3d(3, 1, 2).normalized()).toRotationMatrix();
+        expect_same(model, pose_by(affine(turn, size * Vec3d(1, 2, 3)), model));
+        expect_same(model, without_gradients(pose_by(affine(turn, size * Vec3d(1, 2, 3)), model)));
+    }
 }
 
 /// A driver without faces: cells of one vertex, and gradients only where they are given.
@@ -212,11 +199,9 @@ TEST_F(GpuRestore, PointCloudsToo) {
     points.positions = make_wavy_sphere({.resolution = 16}).positions;
     points.normals.values = points.positions;
     for (Vec3f& n : points.normals.values) n.normalize();
-    for (const Precision precision : kPrecisions) {
-        const Model model = stripped(points, {.precision = precision}).model;
-        expect_same(model, bent_and_twisted(model));
-        expect_same(model, without_gradients(bent_and_twisted(model)));
-    }
+    const Model model = stripped(points, {}).model;
+    expect_same(model, bent_and_twisted(model));
+    expect_same(model, without_gradients(bent_and_twisted(model)));
 }
 
 TEST_F(GpuRestore, NothingToRestoreIsFine) {
@@ -227,16 +212,12 @@ TEST_F(GpuRestore, NothingToRestoreIsFine) {
 }
 
 TEST_F(GpuRestore, SaysWhatItTakesOfTheGpu) {
-    for (const Precision precision : kPrecisions) {
-        const Model model =
-            stripped(with_normals(make_wavy_cube({.resolution = 64})), {.base = 100, .precision = precision}).model;
-        const std::size_t record = precision == Precision::int16 ? 16 : 28, count = model.mesh.vertex_count();
-        const GpuRestorer restorer = gpu_restorer(model, all_vertices(model), model.mesh.normals.values);
-        EXPECT_EQ(restorer.precision(), precision);
-        EXPECT_TRUE(restorer.has_normals());
-        EXPECT_GT(restorer.bytes(), record * count);
-        EXPECT_LT(restorer.bytes(), record * count + 20000); // a hundred driver vertices are next to nothing
-    }
+    const Model model = stripped(with_normals(make_wavy_cube({.resolution = 64})), {.base = 100}).model;
+    const std::size_t record = 28, count = model.mesh.vertex_count();
+    const GpuRestorer restorer = gpu_restorer(model, all_vertices(model), model.mesh.normals.values);
+    EXPECT_TRUE(restorer.has_normals());
+    EXPECT_GT(restorer.bytes(), record * count);
+    EXPECT_LT(restorer.bytes(), record * count + 20000); // a hundred driver vertices are next to nothing
 }
 
 TEST_F(GpuRestore, WhatDoesNotBelongTogetherIsRefused) {

@@ -47,19 +47,14 @@ Deformation bend_and_twist(double bend_deg, double twist_deg) {
             }};
 }
 
-/// Rounding: of float positions for both precisions, and of an int16 record's offset.
+/// Rounding of float positions.
 constexpr double kRounding = 2e-6;
 
-class PoseBoxes : public testing::TestWithParam<Precision> {
-protected:
-    Model model_of(Mesh mesh, std::size_t base = 100) const {
-        return stripped(std::move(mesh), {.base = base, .precision = GetParam()}).model;
-    }
-};
+Model model_of(Mesh mesh, std::size_t base = 100) { return stripped(std::move(mesh), {.base = base}).model; }
 
 } // namespace
 
-TEST_P(PoseBoxes, HoldsBentTwistedAndMirroredShapes) {
+TEST(PoseBoxes, HoldsBentTwistedAndMirroredShapes) {
     const Mesh meshes[] = {make_wavy_cube({.resolution = 24, .frequency = 3}), make_wavy_sphere({.resolution = 24}),
                            make_bar({.resolution = 8}), make_torus({.resolution = 32}),
                            make_wavy_plane({.resolution = 32})};
@@ -91,7 +86,7 @@ TEST_P(PoseBoxes, HoldsBentTwistedAndMirroredShapes) {
     }
 }
 
-TEST_P(PoseBoxes, HoldsWhateverTheGradients) {
+TEST(PoseBoxes, HoldsWhateverTheGradients) {
     std::mt19937 random(7);
     std::normal_distribution<float> number(0, 1);
     const Model model = model_of(make_wavy_cube({.resolution = 16, .frequency = 2}), 60);
@@ -107,7 +102,7 @@ TEST_P(PoseBoxes, HoldsWhateverTheGradients) {
     }
 }
 
-TEST_P(PoseBoxes, HoldsOnlyTheVerticesAskedFor) {
+TEST(PoseBoxes, HoldsOnlyTheVerticesAskedFor) {
     const Model model = model_of(make_wavy_plane({.resolution = 32, .amplitude = 0}));
     std::vector<Index> left;
     std::vector<Vec3f> points;
@@ -127,7 +122,7 @@ TEST_P(PoseBoxes, HoldsOnlyTheVerticesAskedFor) {
 }
 
 /// A driver without faces: cells of one vertex.
-TEST_P(PoseBoxes, HoldsPointSets) {
+TEST(PoseBoxes, HoldsPointSets) {
     Mesh points;
     points.positions = make_wavy_sphere({.resolution = 16}).positions;
     const Model model = model_of(points);
@@ -135,6 +130,3 @@ TEST_P(PoseBoxes, HoldsPointSets) {
     EXPECT_LE(f.outside, kRounding);
     EXPECT_LE(f.slack, 0.1); // one gradient reaches further there
 }
-
-INSTANTIATE_TEST_SUITE_P(Both, PoseBoxes, testing::Values(Precision::float32, Precision::int16),
-                         [](const auto& tested) { return tested.param == Precision::int16 ? "int16" : "float32"; });

@@ -245,38 +245,36 @@ TEST_F(Rendered, ASolidIsSeenFromInsideToo) {
 TEST_F(Rendered, AModelIsRestoredInTheShaderAsOnTheProcessor) {
     Mesh mesh = wavy_cube();
     mesh.normals.values = vertex_normals(mesh, mesh.positions, kOneThread); // which both carry along with the gradients
-    for (const Precision precision : {Precision::float32, Precision::int16}) {
-        const Model model = stripped(mesh, {.base = 150, .precision = precision}).model;
-        const Pose pose = pose_by(bend(80), model);
-        for (const std::optional<unsigned> level : {std::optional<unsigned>(), std::optional<unsigned>(0)}) {
-            const RestoreOptions restore{.level = level};
-            Drawable posed =
-                drawable_of(Drawable::upload(*DrawData::model(model, restore, {}, RestoreOn::gpu, kOneThread)));
-            EXPECT_TRUE(posed.set_pose(pose, kOneThread).ok());
-            const Mesh rest = level_mesh(model, level.value_or(model.finest_level()));
-            Result<Mesh> moved = restorer_of(model, restore).mesh(pose, kOneThread);
-            ASSERT_TRUE(moved.ok());
-            const Mesh& there = *moved;
-            ASSERT_EQ(there.normals.values.size(), there.vertex_count());
-            const Drawable here = surface(there);
-            Scene a = scene_of(posed), b = scene_of(here);
-            a.fixed_ground = b.fixed_ground = true;
-            a.ground_level = b.ground_level = world_bounds(there).min.y() - 1e-4;
-            const Camera camera = camera_on(there);
-            EXPECT_LT(picture_distance(draw(a, camera), draw(b, camera)), 2 * kSame) << int(precision);
-            a.objects[0].appearance.edges = b.objects[0].appearance.edges = true;
-            EXPECT_LT(picture_distance(draw(a, camera), draw(b, camera)), 2 * kSame) << int(precision);
+    const Model model = stripped(mesh, {.base = 150}).model;
+    const Pose pose = pose_by(bend(80), model);
+    for (const std::optional<unsigned> level : {std::optional<unsigned>(), std::optional<unsigned>(0)}) {
+        const RestoreOptions restore{.level = level};
+        Drawable posed =
+            drawable_of(Drawable::upload(*DrawData::model(model, restore, {}, RestoreOn::gpu, kOneThread)));
+        EXPECT_TRUE(posed.set_pose(pose, kOneThread).ok());
+        const Mesh rest = level_mesh(model, level.value_or(model.finest_level()));
+        Result<Mesh> moved = restorer_of(model, restore).mesh(pose, kOneThread);
+        ASSERT_TRUE(moved.ok());
+        const Mesh& there = *moved;
+        ASSERT_EQ(there.normals.values.size(), there.vertex_count());
+        const Drawable here = surface(there);
+        Scene a = scene_of(posed), b = scene_of(here);
+        a.fixed_ground = b.fixed_ground = true;
+        a.ground_level = b.ground_level = world_bounds(there).min.y() - 1e-4;
+        const Camera camera = camera_on(there);
+        EXPECT_LT(picture_distance(draw(a, camera), draw(b, camera)), 2 * kSame);
+        a.objects[0].appearance.edges = b.objects[0].appearance.edges = true;
+        EXPECT_LT(picture_distance(draw(a, camera), draw(b, camera)), 2 * kSame);
 
-            // At rest there is only rounding between them.
-            EXPECT_TRUE(posed.set_pose(rest_pose(model), kOneThread).ok());
-            const Drawable resting = surface(rest);
-            const Scene c = scene_of(resting);
-            const Camera before = camera_on(rest);
-            a = scene_of(posed);
-            a.fixed_ground = true; // the box of a posed model is a little larger
-            a.ground_level = c.box().min.y() - 1e-4 * c.box().diagonal();
-            EXPECT_LT(picture_distance(draw(a, before), draw(c, before)), 2 * kSame) << int(precision);
-        }
+        // At rest there is only rounding between them.
+        EXPECT_TRUE(posed.set_pose(rest_pose(model), kOneThread).ok());
+        const Drawable resting = surface(rest);
+        const Scene c = scene_of(resting);
+        const Camera before = camera_on(rest);
+        a = scene_of(posed);
+        a.fixed_ground = true; // the box of a posed model is a little larger
+        a.ground_level = c.box().min.y() - 1e-4 * c.box().diagonal();
+        EXPECT_LT(picture_distance(draw(a, before), draw(c, before)), 2 * kSame);
     }
 }
 

@@ -276,41 +276,39 @@ TEST_F(InWindow, ComplementsCoverEverythingTogether) {
 TEST_F(InWindow, ProcessorAndShaderRestoreTheSame) {
     Mesh with_normals = wavy_cube();
     with_normals.normals.values = vertex_normals(with_normals, with_normals.positions, kOneThread);
-    for (const Mesh& mesh : {wavy_cube(), with_normals})
-        for (const Precision precision : {Precision::float32, Precision::int16}) {
-            const Model model = stripped(mesh, {.base = 150, .precision = precision}).model;
-            const Pose pose = pose_by(bend(80), model);
-            for (unsigned level = 0; level <= model.finest_level(); ++level) {
-                const RestoreOptions restore{.level = level};
-                const Drawable on_cpu = posed_on(RestoreOn::cpu, model, restore, pose);
-                const Drawable on_gpu = posed_on(RestoreOn::gpu, model, restore, pose);
-                const std::vector<Vec3f> there = *restorer_of(model, restore).positions(pose, kOneThread);
-                const Box exact = bounds(there);
-                EXPECT_LT((on_cpu.box().min - exact.min).norm(), 1e-6);
-                EXPECT_LT((on_cpu.box().max - exact.max).norm(), 1e-6);
-                Mesh seen;
-                seen.positions = there;
-                Scene a = scene_of(on_cpu), b = scene_of(on_gpu);
-                a.fixed_ground = b.fixed_ground = true;
-                a.ground_level = b.ground_level = exact.min.y() - 1e-4;
-                EXPECT_LT(picture_distance(draw(a, camera_on(seen)), draw(b, camera_on(seen))), 2 * kSame) << level;
-                EXPECT_LT(picture_distance(preview(a, camera_on(seen)), preview(b, camera_on(seen))), 2 * kSame);
-            }
-            Drawable drawable = posed_on(RestoreOn::cpu, model, {}, pose);
-            const Picture before = draw(scene_of(drawable), camera_on(mesh));
-            Pose wrong = pose;
-            wrong.positions.pop_back();
-            EXPECT_EQ(drawable.set_pose(wrong, kOneThread).error().code, ErrorCode::mismatch);
-            const RunContext cancelled(1);
-            cancelled.cancel();
-            EXPECT_EQ(drawable.set_pose(rest_pose(model), cancelled).error().code, ErrorCode::cancelled);
-            EXPECT_TRUE(draw(scene_of(drawable), camera_on(mesh)).rgba == before.rgba); // nothing happened
-            EXPECT_TRUE(drawable.set_pose(rest_pose(model), kOneThread).ok());
-            const Drawable rest = surface(mesh);
-            EXPECT_LT(
-                picture_distance(draw(scene_of(drawable), camera_on(mesh)), draw(scene_of(rest), camera_on(mesh))),
-                kSame);
+    for (const Mesh& mesh : {wavy_cube(), with_normals}) {
+        const Model model = stripped(mesh, {.base = 150}).model;
+        const Pose pose = pose_by(bend(80), model);
+        for (unsigned level = 0; level <= model.finest_level(); ++level) {
+            const RestoreOptions restore{.level = level};
+            const Drawable on_cpu = posed_on(RestoreOn::cpu, model, restore, pose);
+            const Drawable on_gpu = posed_on(RestoreOn::gpu, model, restore, pose);
+            const std::vector<Vec3f> there = *restorer_of(model, restore).positions(pose, kOneThread);
+            const Box exact = bounds(there);
+            EXPECT_LT((on_cpu.box().min - exact.min).norm(), 1e-6);
+            EXPECT_LT((on_cpu.box().max - exact.max).norm(), 1e-6);
+            Mesh seen;
+            seen.positions = there;
+            Scene a = scene_of(on_cpu), b = scene_of(on_gpu);
+            a.fixed_ground = b.fixed_ground = true;
+            a.ground_level = b.ground_level = exact.min.y() - 1e-4;
+            EXPECT_LT(picture_distance(draw(a, camera_on(seen)), draw(b, camera_on(seen))), 2 * kSame) << level;
+            EXPECT_LT(picture_distance(preview(a, camera_on(seen)), preview(b, camera_on(seen))), 2 * kSame);
         }
+        Drawable drawable = posed_on(RestoreOn::cpu, model, {}, pose);
+        const Picture before = draw(scene_of(drawable), camera_on(mesh));
+        Pose wrong = pose;
+        wrong.positions.pop_back();
+        EXPECT_EQ(drawable.set_pose(wrong, kOneThread).error().code, ErrorCode::mismatch);
+        const RunContext cancelled(1);
+        cancelled.cancel();
+        EXPECT_EQ(drawable.set_pose(rest_pose(model), cancelled).error().code, ErrorCode::cancelled);
+        EXPECT_TRUE(draw(scene_of(drawable), camera_on(mesh)).rgba == before.rgba); // nothing happened
+        EXPECT_TRUE(drawable.set_pose(rest_pose(model), kOneThread).ok());
+        const Drawable rest = surface(mesh);
+        EXPECT_LT(picture_distance(draw(scene_of(drawable), camera_on(mesh)), draw(scene_of(rest), camera_on(mesh))),
+                  kSame);
+    }
 }
 
 TEST_F(InWindow, DrawablesArePreparedInAnyThread) {

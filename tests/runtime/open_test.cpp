@@ -101,7 +101,6 @@ TEST(RuntimeOpen, TellsWhatTheLibraryKnows) {
             EXPECT_EQ(info.level, level);
             EXPECT_EQ(info.driver_vertices, model.driver().vertices.size());
             EXPECT_EQ(info.driver_triangles, model.driver().face_count());
-            EXPECT_EQ(info.int16_records, model.detail.precision == Precision::int16);
             EXPECT_EQ(info.frames, 0u);
             EXPECT_EQ(info.frames_per_second, 0);
             EXPECT_EQ(info.has_fit, 1u);
@@ -338,6 +337,12 @@ TEST(RuntimeStatus, CutOffOrChangedIsDamaged) {
     }
 }
 
+/// Programs before 0.1.0 wrote records of 16 bits on demand.
+TEST(RuntimeStatus, Int16RecordsAreRefusedWithAWayOut) {
+    EXPECT_EQ(open_status(Forged(cube_file()).set("bl.prec", 0, 1u).bytes()), FLG_OLD_RECORDS);
+    EXPECT_NE(std::string(flg_status_text(FLG_OLD_RECORDS)).find("strip the mesh again"), std::string::npos);
+}
+
 TEST(RuntimeStatus, NumbersThatContradictEachOtherAreDamage) {
     const std::string& bytes = cube_file();
     const auto expect_damage = [](std::string forged, const char* what) {
@@ -356,8 +361,7 @@ TEST(RuntimeStatus, NumbersThatContradictEachOtherAreDamage) {
     expect_damage(Forged(bytes).set("lev.vert", 1, 0u).bytes(), "driver vertices that do not ascend");
     expect_damage(Forged(bytes).set("levels", 0, 0u).bytes(), "no levels");
     expect_damage(Forged(bytes).set("levels", 0, 65u).bytes(), "too many levels");
-    expect_damage(Forged(bytes).set("bl.prec", 0, 2u).bytes(), "a precision that is not known");
-    expect_damage(Forged(bytes).set("bl.prec", 0, 1u).bytes(), "int16 without its sections");
+    expect_damage(Forged(bytes).set("bl.prec", 0, 2u).bytes(), "records of a kind that is not known");
     expect_damage(Forged(bytes).set("bl.cell", 2, 50u).bytes(), "a cell out of range");
     expect_damage(Forged(bytes).set("bl.run", 1, 0u).bytes(), "a run of none");
     expect_damage(Forged(bytes).set("bl.run", 1, 0xffffffffu).bytes(), "a run past its block");
@@ -382,13 +386,6 @@ TEST(RuntimeStatus, NumbersThatContradictEachOtherAreDamage) {
     Forged behind(bytes);
     behind.section("bl.v").offset = bytes.size() + 8;
     expect_damage(behind.bytes(), "a section behind the end");
-
-    const std::string rounded =
-        write_model(stripped(make_wavy_cube({.resolution = 12}), {.base = 50, .precision = Precision::int16}).model);
-    expect_damage(Forged(rounded).set("bl.u16", 0, std::int16_t{-32768}).bytes(), "a rounded weight out of range");
-    expect_damage(Forged(rounded).set("bl.scale", 0, INFINITY).bytes(), "a scale that is not finite");
-    expect_damage(Forged(rounded).rename("drv.pos", "gone").bytes(), "no positions at all");
-    expect_damage(Forged(rounded).set("drv.pos", 0, NAN).bytes(), "a driver that is no number");
 
     const std::string corners =
         write_model(stripped(with_corner_normals(make_wavy_cube({.resolution = 6})), {.base = 20}).model);
@@ -568,19 +565,15 @@ TEST(RuntimeStatus, MemoryIsBoundedByTheFile) {
 // ---- Edges ----
 
 TEST(RuntimeEdges, BytesMayBeginAnywhere) {
-    for (const Precision precision : {Precision::float32, Precision::int16}) {
-        const Model model =
-            stripped(with_vertex_normals(make_wavy_cube({.resolution = 8})), {.base = 30, .precision = precision})
-                .model;
-        const std::string bytes = write_model(model);
-        const Pose pose = random_pose(model, 1);
-        const RuntimeMesh wanted = restore_all(open_model(bytes), pose);
-        for (std::size_t shift = 1; shift < 8; ++shift) {
-            const std::string moved = std::string(shift, 'x') + bytes;
-            flg_model* model_at = nullptr;
-            ASSERT_EQ(flg_open(moved.data() + shift, bytes.size(), nullptr, &model_at), FLG_OK);
-            EXPECT_TRUE(same_bytes(restore_all(Opened(model_at), pose).positions, wanted.positions));
-        }
+    const Model model = stripped(with_vertex_normals(make_wavy_cube({.resolution = 8})), {.base = 30}).model;
+    const std::string bytes = write_model(model);
+    const Pose pose = random_pose(model, 1);
+    const RuntimeMesh wanted = restore_all(open_model(bytes), pose);
+    for (std::size_t shift = 1; shift < 8; ++shift) {
+        const std::string moved = std::string(shift, 'x') + bytes;
+        flg_model* model_at = nullptr;
+        ASSERT_EQ(flg_open(moved.data() + shift, bytes.size(), nullptr, &model_at), FLG_OK);
+        EXPECT_TRUE(same_bytes(restore_all(Opened(model_at), pose).positions, wanted.positions));
     }
 }
 

@@ -130,9 +130,6 @@ struct NamedModel {
     Model model;
 };
 
-/// As files hold it: of int16 models the rounded shape.
-inline Model as_read(const Model& model) { return read_model(write_model(model), "the model", kOneThread).value(); }
-
 /// Every kind of model that a file can hold, small.
 inline std::vector<NamedModel> models_of_every_kind() {
     std::vector<NamedModel> all;
@@ -141,28 +138,22 @@ inline std::vector<NamedModel> models_of_every_kind() {
     points.positions = sphere.positions;
     Mesh single;
     single.positions = {{1, 2, 3}};
-    for (const Precision precision : {Precision::float32, Precision::int16}) {
-        const std::string kind = precision == Precision::int16 ? " int16" : " float";
-        const auto add = [&](const char* name, Mesh mesh, std::size_t base, bool reorder = false) {
-            all.push_back(
-                {name + kind,
-                 stripped(std::move(mesh), {.base = base, .precision = precision, .reorder = reorder}).model});
-        };
-        add("cube", cube, 60);
-        add("cube, vertex normals", with_vertex_normals(cube), 60);
-        add("sphere, corner normals", with_corner_normals(sphere), 60);
-        add("sphere, reordered", with_vertex_normals(sphere), 60, true);
-        add("tiny", with_vertex_normals(scaled(cube, 1e-20f)), 40);
-        add("huge", with_vertex_normals(scaled(cube, 1e20f)), 40);
-        add("points", points, 30);
-        add("one point", single, 3);
-        all.push_back({"driver made elsewhere" + kind,
-                       strip_to_driver(with_corner_normals(cube), make_wavy_cube({.resolution = 3, .amplitude = 0}),
-                                       precision, kOneThread)
-                           .value()
-                           .model});
-    }
-    for (NamedModel& each : all) each.model = as_read(each.model);
+    const auto add = [&](const char* name, Mesh mesh, std::size_t base, bool reorder = false) {
+        all.push_back({name, stripped(std::move(mesh), {.base = base, .reorder = reorder}).model});
+    };
+    add("cube", cube, 60);
+    add("cube, vertex normals", with_vertex_normals(cube), 60);
+    add("sphere, corner normals", with_corner_normals(sphere), 60);
+    add("sphere, reordered", with_vertex_normals(sphere), 60, true);
+    add("tiny", with_vertex_normals(scaled(cube, 1e-20f)), 40);
+    add("huge", with_vertex_normals(scaled(cube, 1e20f)), 40);
+    add("points", points, 30);
+    add("one point", single, 3);
+    all.push_back(
+        {"driver made elsewhere",
+         strip_to_driver(with_corner_normals(cube), make_wavy_cube({.resolution = 3, .amplitude = 0}), kOneThread)
+             .value()
+             .model});
     return all;
 }
 

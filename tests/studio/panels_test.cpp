@@ -146,8 +146,6 @@ TEST_F(Panels, ShapesFollowTheirSliders) {
 TEST_F(Panels, ChoicesAndSwitchesReachTheWorkbench) {
     choose("deform.axis", 2);
     EXPECT_EQ(state().warps.axis, Axis::z);
-    choose("detail.precision", 1);
-    EXPECT_EQ(state().strip.precision, Precision::int16);
     choose("body.preset", 2);
     EXPECT_EQ(state().body.preset, "jelly");
     choose("body.obstacle", 2);
@@ -263,12 +261,10 @@ TEST_F(Panels, AChangeKeepsTheOneThatIsStillBeingMade) {
     get<QDoubleSpinBox>("model.resolution.number").setValue(12);
     get<QDoubleSpinBox>("model.frequency.number").setValue(3);
     get<QDoubleSpinBox>("detail.driver.number").setValue(100);
-    get<QComboBox>("detail.precision").setCurrentIndex(1);
     workbench().wait_until_idle();
     EXPECT_EQ(state().shape->options.resolution, 12u);
     EXPECT_EQ(state().shape->options.frequency, 3);
     EXPECT_EQ(state().strip.base, std::optional<std::size_t>(100));
-    EXPECT_EQ(state().strip.precision, Precision::int16);
 }
 
 TEST_F(Panels, TheDriverIsNoLargerThanTheMesh) {

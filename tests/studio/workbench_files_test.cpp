@@ -293,21 +293,19 @@ TEST_F(WorkbenchTest, AnOpenedModelKnowsHowItWasStripped) {
     make_small_shape();
     StripOptions strip;
     strip.base = 80;
-    strip.precision = Precision::int16;
     bench.set_strip(strip);
     bench.wait_until_idle();
     const std::size_t driver = state().model->driver().vertices.size();
     bench.save_model(path("a.fil"));
     bench.open(path("a.fil"));
     bench.wait_until_idle();
-    EXPECT_EQ(state().strip.precision, Precision::int16);
     EXPECT_EQ(state().strip.base, driver);
 }
 
 /// Its vertices are in the file behind the mesh's own, and nowhere else.
 TEST_F(WorkbenchTest, ADriverMadeElsewhereIsNoPartOfTheMesh) {
     const Mesh ball = make_wavy_sphere({.resolution = 24}), cage = make_wavy_sphere({.resolution = 8, .amplitude = 0});
-    const Model model = strip_to_driver(ball, cage, Precision::float32, RunContext()).value().model;
+    const Model model = strip_to_driver(ball, cage, RunContext()).value().model;
     ASSERT_TRUE(write_model(model, path("caged.fil"), RunContext()).ok());
     bench.open(path("caged.fil"));
     bench.wait_until_idle();

@@ -12,7 +12,6 @@ export interface ModelInfo {
     parts: number;
     frames: number;
     framesHaveGradients: boolean;
-    int16Records: boolean;
     hasFit: boolean;
     lanes: number;
     framesPerSecond: number;

@@ -6,7 +6,7 @@ const FINEST = 0xffffffff;
 const WITHOUT_NORMALS = 2, WITHOUT_TRIANGLES = 4, WITHOUT_FIT = 8; // flg_options.flags
 const OPTIONS_BYTES = 28, INFO_BYTES = 96; // of flg_options and flg_info with pointers of 32 bits
 const INFO = ["vertices", "normals", "normalSource", "triangles", "faces", "driverVertices", "driverTriangles", "levels",
-    "level", "parts", "frames", "framesHaveGradients", "int16Records", "hasFit", "lanes"];
+    "level", "parts", "frames", "framesHaveGradients", "hasFit", "lanes"];
 const SKIN_STEP = 16384; // vertices; their skin fits into the memory of a restore
 const NORMAL_SOURCES = ["none", "vertex", "corner", "computed"];
 
@@ -100,7 +100,6 @@ export class Model {
             framesPerSecond, origin,
             normalSource: NORMAL_SOURCES[this.info.normalSource],
             framesHaveGradients: this.info.framesHaveGradients !== 0,
-            int16Records: this.info.int16Records !== 0,
             hasFit: this.info.hasFit !== 0,
         });
         this.uvs = this.#uvs(at, file.length, info);

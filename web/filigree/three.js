@@ -1,12 +1,11 @@
 // What follows a model's driver in three.js: a mesh restored in the vertex shader, and a geometry restored on the
 // processor, in WebAssembly.
 import { Box3, BufferAttribute, BufferGeometry, DynamicDrawUsage, Vector3 } from "three";
-import { copyPoints, drawnUvs, drawnVertices } from "./drawn.js";
+import { copyPoints, drawnSkin, drawnUvs, drawnVertices, restGradients } from "./drawn.js";
 import { DrivenMesh, DriverSkeleton } from "./three_skin.js";
 
 export { correctSkinNormals } from "./three_skin.js";
 
-const MOST_SMALL_INDICES = 65536;
 const SAME_PLACE = 1e-3; // of the diagonal: files may hold rounded positions
 
 /** Restored in the vertex shader: each frame uploads 64 bytes a driver vertex. */
@@ -32,24 +31,8 @@ export class RestoredMesh extends DrivenMesh {
 }
 
 function skinnedGeometry(model) {
-    const { drivers, weights, points } = model.skin();
     const { corners, index } = drawnVertices(model);
-    const count = corners ? corners.vertex.length : model.info.vertices;
-    const joint = new (model.info.driverVertices <= MOST_SMALL_INDICES ? Uint16Array : Float32Array)(4 * count);
-    const weight = new Float32Array(4 * count), position = new Float32Array(3 * count);
-    const normal = model.info.normals > 0 ? new Float32Array(3 * count) : null;
-    const rest = restOf(model), driver = model.driverRest;
-    let reach = 0;
-    for (let k = 0; k < count; ++k) {
-        const v = corners ? corners.vertex[k] : k, nearest = 3 * drivers[3 * v];
-        for (let i = 0; i < 3; ++i) {
-            joint[4 * k + i] = drivers[3 * v + i];
-            weight[4 * k + i] = weights[3 * v + i];
-        }
-        reach = Math.max(reach, Math.hypot(...[0, 1, 2].map((i) => rest[3 * v + i] - driver[nearest + i])));
-    }
-    copyPoints(points, corners?.vertex, position);
-    if (normal) copyPoints(model.normals, corners?.normal, normal);
+    const { position, normal, joint, weight, count, reach } = drawnSkin(model, corners);
     const geometry = new BufferGeometry().setIndex(new BufferAttribute(index, 1));
     geometry.setAttribute("position", new BufferAttribute(position, 3)); // of the skin: the shader makes places of them
     if (normal) geometry.setAttribute("normal", new BufferAttribute(normal, 3));
@@ -57,15 +40,6 @@ function skinnedGeometry(model) {
     geometry.setAttribute("skinIndex", new BufferAttribute(joint, 4));
     geometry.setAttribute("skinWeight", new BufferAttribute(weight, 4));
     return { geometry, reach };
-}
-
-/** Positions at rest; model.normals has the normals. */
-function restOf(model) {
-    return model.restore(model.driverRest.slice(), { gradients: restGradients(model) }).positions;
-}
-
-function restGradients(model) {
-    return Float32Array.from({ length: 9 * model.info.driverVertices }, (_, k) => (k % 9 % 4 === 0 ? 1 : 0));
 }
 
 /** One vertex for each pair of a vertex and its normal and UV, where corners have their own; else the model's. */

@@ -7,10 +7,6 @@ namespace {
 
 constexpr std::size_t kLeastDriver = 3; // vertices: a face
 
-const Field<StripOptions> kHalfSize = {
-    [](const StripOptions& options) { return double(options.precision == Precision::int16); },
-    [](StripOptions& options, double half) { options.precision = half ? Precision::int16 : Precision::float32; }};
-
 class DetailPanel : public Panel {
 public:
     explicit DetailPanel(Workbench& workbench) : Panel("detail", workbench) {
@@ -48,8 +44,6 @@ private:
         driver_ = number(
             rows, options.setting("detail.driver", "Size", "About so many vertices move; all others follow", size),
             {.least = kLeastDriver, .most = 20000, .decimals = 0, .unit = "vertices", .logarithmic = true});
-        choice(rows, options.setting("detail.precision", "Precision", "Of what is stored for each vertex", kHalfSize),
-               {"32 bit (20 bytes a vertex)", "16 bit (10 bytes a vertex)"});
     }
 
     void refresh() override {

@@ -915,7 +915,6 @@ def strip(
     fidelity: float | None = None,
     fidelity_from: str = 'positions',
     max_edge: float | None = None,
-    precision: str = 'float',
     reorder: bool = False,
     threads: int = 0,
     progress: _Progress | None = None,

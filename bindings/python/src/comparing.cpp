@@ -74,7 +74,6 @@ py::dict model_info(const Model& model) {
         levels.append(level);
     }
     said["levels"] = levels;
-    said["precision"] = model.detail.precision == Precision::int16 ? "int16" : "float";
     said["across_gap"] = model.detail.across_gap.size();
     said["facing_away"] = model.detail.facing_away.size();
     return said;

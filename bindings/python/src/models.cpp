@@ -37,16 +37,11 @@ PoseSource source_of(const std::string& from) {
                                 {{"positions", PoseSource::positions}, {"gradients", PoseSource::gradients}});
 }
 
-Precision precision_of(const std::string& precision) {
-    return value_of<Precision>(precision, "precision", {{"float", Precision::float32}, {"int16", Precision::int16}});
-}
-
-PyModel strip_to(const py::object& given, const py::object& driver_given, const std::string& precision,
-                 unsigned threads, const py::object& progress) {
+PyModel strip_to(const py::object& given, const py::object& driver_given, unsigned threads,
+                 const py::object& progress) {
     const MeshPtr mesh = mesh_of(given), driver = mesh_of(driver_given);
-    const Precision stored = precision_of(precision);
     Stripped stripped = LongCall{threads, progress}.owning(
-        [=](const RunContext& context) { return strip_to_driver(*mesh, *driver, stored, context).value(); });
+        [=](const RunContext& context) { return strip_to_driver(*mesh, *driver, context).value(); });
     warn(stripped.report.warnings);
     return {std::make_shared<const Model>(std::move(stripped.model)), report_of(stripped.report)};
 }
@@ -57,17 +52,16 @@ py::object listed(const py::object& self, const std::vector<Index> BlendDetail::
 
 PyModel strip_mesh(const py::object& given, const py::object& driver, std::optional<std::size_t> base,
                    std::optional<unsigned> levels, std::optional<double> error, std::optional<double> fidelity,
-                   const std::string& fidelity_from, std::optional<double> max_edge, const std::string& precision,
-                   bool reorder, unsigned threads, const py::object& progress) {
+                   const std::string& fidelity_from, std::optional<double> max_edge, bool reorder, unsigned threads,
+                   const py::object& progress) {
     if (!driver.is_none()) {
         if (base || levels || error || fidelity || max_edge || reorder)
             refuse("With driver, how coarse the driver is is settled: leave out base, levels, error, fidelity, "
                    "max_edge and reorder.");
-        return strip_to(given, driver, precision, threads, progress);
+        return strip_to(given, driver, threads, progress);
     }
     const MeshPtr mesh = mesh_of(given);
     StripOptions options{.base = base, .levels = levels, .error = error, .max_edge = max_edge};
-    options.precision = precision_of(precision);
     options.reorder = reorder;
     const LongCall call{threads, progress};
     if (!fidelity) {
@@ -204,9 +198,8 @@ dict
         "strip", &strip_mesh, py::arg("mesh"), py::kw_only(), py::arg("driver") = py::none(),
         py::arg("base") = py::none(), py::arg("levels") = py::none(), py::arg("error") = py::none(),
         py::arg("fidelity") = py::none(), py::arg("fidelity_from") = "positions", py::arg("max_edge") = py::none(),
-        py::arg("precision") = "float", py::arg("reorder") = false, py::arg("threads") = 0,
-        py::arg("progress") = py::none(),
-        R"(strip(mesh, *, driver=None, base=None, levels=None, error=None, fidelity=None, fidelity_from='positions', max_edge=None, precision='float', reorder=False, threads=0, progress=None)
+        py::arg("reorder") = false, py::arg("threads") = 0, py::arg("progress") = py::none(),
+        R"(strip(mesh, *, driver=None, base=None, levels=None, error=None, fidelity=None, fidelity_from='positions', max_edge=None, reorder=False, threads=0, progress=None)
 --
 
 Take the detail off a mesh: a model with a light driver.
@@ -217,7 +210,7 @@ mesh : Mesh, or an object with vertices and faces or triangles
     Any mesh that has a vertex; what cannot be bound well is counted in the model's `report`.
 driver : Mesh, or an object with vertices and faces or triangles, optional
     Mesh to bind to that was made elsewhere: its vertices, in their order, are the driver's. Restored meshes have
-    the vertices of `mesh` alone. Goes with `precision` alone.
+    the vertices of `mesh` alone. Goes with none of the options below but `threads` and `progress`.
 base : int, optional
     Vertices of the driver, about; 3 or more. At most one of `base`, `levels`, `error` and `fidelity`; with none 1,000,
     fewer for meshes below 20,000.
@@ -231,8 +224,6 @@ fidelity_from : str
     What poses will come with: 'positions', or 'gradients' too.
 max_edge : float, optional
     Longest edge that simplifying may leave, fraction of the diagonal: flat parts keep vertices.
-precision : str
-    'float', 20 bytes a vertex, or 'int16', 10 bytes.
 reorder : bool
     Put the vertices in an order along which neighbours lie together, so that a mesh whose order is hopeless restores
     faster; the model's `source_order` says where they were.

@@ -34,7 +34,7 @@ def test_make(program):
     [
         ([], {}),
         (["--base", 300], {"base": 300}),
-        (["--levels", 2, "--precision", "int16"], {"levels": 2, "precision": "int16"}),
+        (["--levels", 2], {"levels": 2}),
         (["--error", 1e-3], {"error": 1e-3}),
         (["--fidelity", 1e-3], {"fidelity": 1e-3}),
         (["--max-edge", 0.1], {"max_edge": 0.1}),

@@ -11,9 +11,8 @@ def cage():
     return filigree.make("wavy-sphere", resolution=6, amplitude=0)
 
 
-@pytest.mark.parametrize("precision", ["float", "int16"])
-def test_restored_meshes_have_the_meshs_own_vertices(mesh, cage, precision, tmp_path):
-    model = filigree.strip(mesh, driver=cage, precision=precision)
+def test_restored_meshes_have_the_meshs_own_vertices(mesh, cage, tmp_path):
+    model = filigree.strip(mesh, driver=cage)
     count = len(mesh.vertices)
     assert len(model.mesh.vertices) == len(model.level(1).vertices) == count
     assert f"{count} vertices" in repr(model)

@@ -38,7 +38,11 @@ def test_each_is_raised(tmp_path, mesh, model):
     bad.write_bytes(b"ply\nformat ascii 1.0\nelement vertex 5\nend_header\n")
     raises("UsageError", "base", lambda: filigree.strip(mesh, base=2))
     raises("UsageError", "At most one|one of", lambda: filigree.strip(mesh, base=50, levels=2))
-    raises("UsageError", "precision is 'int8'.*'float', 'int16'", lambda: filigree.strip(mesh, precision="int8"))
+    raises(
+        "UsageError",
+        "fidelity_from is 'faces'.*'positions', 'gradients'",
+        lambda: filigree.strip(mesh, fidelity=1e-3, fidelity_from="faces"),
+    )
     raises("UsageError", r"faces\[0\]\[2\] is 9; there are 3", lambda: filigree.Mesh(numpy.eye(3), [[0, 1, 9]]))
     raises("UsageError", r"vertices\[1\] is not finite", lambda: filigree.Mesh([[0, 0, 0], [0, numpy.nan, 0]]))
     raises("UsageError", r"positions\[0\] is not finite", lambda: filigree.restore(model, numpy.full((200, 3), numpy.inf)))

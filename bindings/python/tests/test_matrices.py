@@ -64,7 +64,7 @@ def test_the_matrix_without_scipy(restorer, pose, monkeypatch):
         matrix @ numpy.zeros(3)
 
 
-@pytest.mark.parametrize("options", [{"precision": "int16"}, {"driver": "own"}], ids=["int16", "own driver"])
+@pytest.mark.parametrize("options", [{}, {"driver": "own"}], ids=["plain", "own driver"])
 def test_matrices_of_other_models(mesh, options):
     if options.get("driver"):
         options = {"driver": filigree.make("wavy-sphere", resolution=6, amplitude=0)}

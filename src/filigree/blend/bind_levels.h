@@ -9,7 +9,6 @@ namespace filigree {
 /// Binds a mesh to the coarsest of its levels. levels: one or more, coarse to fine, of triangles; nothing is checked.
 /// work: of the mesh, welded as the model should see it. Cost O(V log V). Errors: unsuitable (more triangles than
 /// kMostListedTriangles), cancelled.
-Result<Model> bind_to_levels(Mesh mesh, std::vector<Level> levels, const WorkingMesh& work, Precision precision,
-                             const RunContext& context);
+Result<Model> bind_to_levels(Mesh mesh, std::vector<Level> levels, const WorkingMesh& work, const RunContext& context);
 
 } // namespace filigree

@@ -12,8 +12,6 @@ namespace filigree {
 
 namespace {
 
-constexpr float kWeightStep = 1.0f / 32767.0f; // of an int16 weight
-
 /// m: the point of the cell that a record hangs on.
 Vec3d anchor(const Triangle& cell, double u, double v, std::span<const Vec3f> positions,
              std::span<const Index> driver) {
@@ -23,43 +21,16 @@ Vec3d anchor(const Triangle& cell, double u, double v, std::span<const Vec3f> po
     return m;
 }
 
-float round_weight(float w) { return std::round(w * 32767.0f) * kWeightStep; }
-
-void quantise_offsets(BlendDetail& detail, std::span<const Vec3f> positions, std::span<const Index> driver) {
-    detail.offsets.resize(detail.order.size());
-    detail.cell_scales.assign(detail.cells.size(), 0);
-    std::vector<Vec3d> offsets;
-    for (std::size_t c = 0; c < detail.cells.size(); ++c) {
-        offsets.clear();
-        double largest = 0;
-        for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
-            offsets.push_back(positions[detail.order[r]].cast<double>() -
-                              anchor(detail.cells[c], detail.u[r], detail.v[r], positions, driver));
-            largest = std::max(largest, offsets.back().cwiseAbs().maxCoeff());
-        }
-        // Rounded up: the largest offset has to fit, also where floats are too small to hold all their digits.
-        float scale = static_cast<float>(largest / 32767.0);
-        while (32767.0 * scale < largest) scale = std::nextafter(scale, std::numeric_limits<float>::infinity());
-        detail.cell_scales[c] = scale;
-        for (std::size_t k = 0; k < offsets.size(); ++k)
-            for (int axis = 0; axis < 3; ++axis)
-                detail.offsets[detail.cell_offsets[c] + k][axis] =
-                    scale > 0 ? static_cast<std::int16_t>(std::round(offsets[k][axis] / scale)) : std::int16_t{0};
-    }
-}
-
 } // namespace
 
-BlendDetail encode_blend(std::span<const Vec3f> positions, std::span<const Index> driver, std::vector<Triangle> cells,
-                         const Binding& binding, Precision precision) {
+BlendDetail encode_blend(std::vector<Triangle> cells, const Binding& binding) {
     BlendDetail detail;
     detail.cells = std::move(cells);
-    detail.precision = precision;
     detail.across_gap = binding.across_gap;
     detail.facing_away = binding.facing_away;
 
-    const std::size_t count = positions.size();
     detail.cell_offsets.assign(detail.cells.size() + 1, 0);
+    const std::size_t count = binding.bonds.size();
     for (const Bond& bond : binding.bonds) ++detail.cell_offsets[bond.cell + 1];
     for (std::size_t c = 0; c < detail.cells.size(); ++c) detail.cell_offsets[c + 1] += detail.cell_offsets[c];
     std::vector<Index> next(detail.cell_offsets.begin(), detail.cell_offsets.end() - 1);
@@ -69,12 +40,10 @@ BlendDetail encode_blend(std::span<const Vec3f> positions, std::span<const Index
     for (Index vertex = 0; vertex < count; ++vertex) {
         const Bond& bond = binding.bonds[vertex];
         const Index r = next[bond.cell]++;
-        const bool rounded = precision == Precision::int16;
         detail.order[r] = vertex;
-        detail.u[r] = rounded ? round_weight(bond.u) : bond.u;
-        detail.v[r] = rounded ? round_weight(bond.v) : bond.v;
+        detail.u[r] = bond.u;
+        detail.v[r] = bond.v;
     }
-    if (precision == Precision::int16) quantise_offsets(detail, positions, driver);
     return detail;
 }
 
@@ -89,18 +58,6 @@ std::vector<Mat3f> vertex_gradients(const BlendDetail& detail, std::span<const M
         }
     }
     return gradients;
-}
-
-void decode_rest(const BlendDetail& detail, std::span<const Index> driver, std::span<Vec3f> positions) {
-    std::vector<Vec3f> driver_rest;
-    for (Index v : driver) driver_rest.push_back(positions[v]);
-    for (std::size_t c = 0; c < detail.cells.size(); ++c)
-        for (Index r = detail.cell_offsets[c]; r < detail.cell_offsets[c + 1]; ++r) {
-            const Vec3d m = anchor(detail.cells[c], detail.u[r], detail.v[r], positions, driver);
-            flg_rest_of_steps(m.data(), detail.cell_scales[c], detail.offsets[r].data(),
-                              positions[detail.order[r]].data());
-        }
-    for (std::size_t i = 0; i < driver.size(); ++i) positions[driver[i]] = driver_rest[i];
 }
 
 struct BlendRestorer::Content {
@@ -161,21 +118,13 @@ std::vector<WantedRecord> wanted_records(const BlendDetail& detail, std::size_t 
     return wanted;
 }
 
-void make_room(const BlendDetail& detail, std::size_t items, bool has_normals, double scale,
-               blend_kernel::Records& records) {
+void make_room(const BlendDetail& detail, std::size_t items, bool has_normals, blend_kernel::Records& records) {
     records.count = items;
     records.cells = detail.cells;
     const std::size_t padded = items + blend_kernel::kPadding;
-    if (detail.precision == Precision::int16) {
-        records.u16.assign(padded, 0);
-        records.v16.assign(padded, 0);
-        for (auto& o : records.offset) o.assign(padded, 0);
-        for (float s : detail.cell_scales) records.scale.push_back(static_cast<float>(s * scale));
-    } else {
-        records.u.assign(padded, 0);
-        records.v.assign(padded, 0);
-        for (auto& q : records.q) q.assign(padded, 0);
-    }
+    records.u.assign(padded, 0);
+    records.v.assign(padded, 0);
+    for (auto& q : records.q) q.assign(padded, 0);
     if (has_normals)
         for (auto& n : records.normal) n.assign(padded, 0);
 }
@@ -210,7 +159,7 @@ BlendRestorer::~BlendRestorer() = default;
 BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> positions, std::span<const Index> driver,
                              std::span<const Item> items, std::span<const Vec3f> normals, const RunContext& context)
     : content_(std::make_unique<Content>()) {
-    Box box; // the driver's, which files of either precision keep to the bit
+    Box box; // the driver's
     for (Index v : driver) box.extend(positions[v].cast<double>());
     const Vec3d centre = box.centre();
     content_->scale = flg_inner_scale(box.diagonal(), bounds(positions).diagonal());
@@ -220,21 +169,14 @@ BlendRestorer::BlendRestorer(const BlendDetail& detail, std::span<const Vec3f> p
     std::vector<WantedRecord> wanted = wanted_records(detail, positions.size(), items);
     const bool in_blocks = sort_into_blocks(items, wanted);
     blend_kernel::Records& records = content_->records;
-    make_room(detail, items.size(), !normals.empty(), scale, records);
+    make_room(detail, items.size(), !normals.empty(), records);
     add_runs(items, wanted, in_blocks, records);
     // Every record has a place of its own by now.
-    const bool int16 = detail.precision == Precision::int16;
     parallel_for(context, wanted.size(), kRestorerGrain, [&](std::size_t begin, std::size_t end) {
         for (std::size_t at = begin; at < end; ++at) {
             const auto& [c, r, i] = wanted[at];
             if (!normals.empty())
                 for (int k = 0; k < 3; ++k) records.normal[k][at] = normals[i][k];
-            if (int16) {
-                records.u16[at] = static_cast<std::int16_t>(std::round(detail.u[r] * 32767.0f));
-                records.v16[at] = static_cast<std::int16_t>(std::round(detail.v[r] * 32767.0f));
-                for (int k = 0; k < 3; ++k) records.offset[k][at] = detail.offsets[r][k];
-                continue;
-            }
             records.u[at] = detail.u[r];
             records.v[at] = detail.v[r];
             const Vec3d m = anchor(detail.cells[c], detail.u[r], detail.v[r], positions, driver);

@@ -26,13 +26,8 @@ namespace blend_kernel {
 struct Records;
 } // namespace blend_kernel
 
-/// Sorts bonds into records; for int16 rounds the weights first, then the offsets from them, so that rounding the
-/// weights costs nothing. positions: the mesh's; driver: the driver's vertex ids. Cost O(V).
-BlendDetail encode_blend(std::span<const Vec3f> positions, std::span<const Index> driver, std::vector<Triangle> cells,
-                         const Binding& binding, Precision precision);
-
-/// The positions an int16 detail decodes to at rest: those of the driver are given, the rest is written. Cost O(V).
-void decode_rest(const BlendDetail& detail, std::span<const Index> driver, std::span<Vec3f> positions);
+/// Sorts bonds, one a vertex of the mesh, into records. Cost O(V).
+BlendDetail encode_blend(std::vector<Triangle> cells, const Binding& binding);
 
 /// How space is deformed around each vertex of the mesh: A_p above. driver_gradients: one a driver vertex. Cost O(V).
 std::vector<Mat3f> vertex_gradients(const BlendDetail& detail, std::span<const Mat3f> driver_gradients);

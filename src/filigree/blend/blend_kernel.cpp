@@ -14,17 +14,10 @@ flg_records view_of(const Records& records) {
     flg_records view{};
     view.runs = records.runs.data();
     view.cells = records.cells.empty() ? nullptr : records.cells.front().data();
-    if (records.is_int16()) {
-        view.u16 = records.u16.data();
-        view.v16 = records.v16.data();
-        view.scale = records.scale.data();
-    } else {
-        view.u = records.u.data();
-        view.v = records.v.data();
-    }
+    view.u = records.u.data();
+    view.v = records.v.data();
     for (int k = 0; k < 3; ++k) {
         view.q[k] = records.q[k].data();
-        view.offset[k] = records.offset[k].data();
         view.normal[k] = records.normal[k].data();
     }
     return view;

@@ -20,23 +20,19 @@ inline constexpr std::size_t kPadding = FLG_PADDING;
 /// Slots that are restored at a time when order is asked for: their points stay in the second-level cache.
 inline constexpr Index kBlock = FLG_BLOCK;
 
-/// Everything about the records that does not change from pose to pose. Per record either q or offset is filled.
+/// Everything about the records that does not change from pose to pose.
 struct Records {
     std::vector<Run> runs;
-    std::vector<Triangle> cells;         ///< of driver vertices
-    std::vector<float> u, v;             ///< float records
-    std::vector<float> q[3];             ///< float records: p - m / 2
-    std::vector<std::int16_t> u16, v16;  ///< int16 records: 32767 is 1
-    std::vector<std::int16_t> offset[3]; ///< int16 records: (p - m) / scale of the cell
-    std::vector<float> scale;            ///< int16 records: one a cell
-    std::vector<float> normal[3];        ///< empty or unit rest normals
-    std::vector<Index> slot;             ///< where record r goes when order is asked for
+    std::vector<Triangle> cells;  ///< of driver vertices
+    std::vector<float> u, v;      ///< weights of the cell's second and third corner
+    std::vector<float> q[3];      ///< p - m / 2
+    std::vector<float> normal[3]; ///< empty or unit rest normals
+    std::vector<Index> slot;      ///< where record r goes when order is asked for
     /// Where the mesh's order allows it, records come block by block of kBlock slots, and in a block by cell. Else
     /// none.
     std::vector<Index> block_runs;   ///< the first run of each block, and the end
     std::vector<std::uint16_t> from; ///< of each slot: which record of its block goes there
 
-    bool is_int16() const { return !u16.empty(); }
     std::size_t count = 0;
 };
 

@@ -121,12 +121,6 @@ std::string check_blend(const BlendDetail& detail, std::size_t vertex_count, std
     }
     for (std::size_t r = 0; r < vertex_count; ++r)
         if (!(std::abs(detail.u[r]) <= 1 && std::abs(detail.v[r]) <= 1)) return "a weight is out of range";
-    if (detail.precision == Precision::int16) {
-        if (detail.offsets.size() != vertex_count || detail.cell_scales.size() != detail.cells.size())
-            return "there is not one offset a record";
-        for (float scale : detail.cell_scales)
-            if (!std::isfinite(scale)) return "a cell's scale is not finite";
-    }
     if (!ascending_below(detail.across_gap, vertex_count) || !ascending_below(detail.facing_away, vertex_count))
         return "a list of vertices is not ascending";
     return "";

@@ -142,7 +142,7 @@ std::vector<std::string> driver_warnings(std::span<const Vec3f> positions, std::
 
 } // namespace
 
-Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, Precision precision, const RunContext& context) {
+Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, const RunContext& context) {
     if (std::optional<Error> error = check_driver(mesh, driver)) return *error;
     const double bind_start = now_seconds();
     Result<Surface> driver_surface = make_surface(driver, context);
@@ -176,14 +176,14 @@ Result<Stripped> strip_to_driver(Mesh mesh, const Mesh& driver, Precision precis
     result.report.facing_away = binding->facing_away.size();
     result.report.bind_seconds = now_seconds() - bind_start;
     result.report.warnings = driver_warnings(mesh.positions, own, binding->facing_away.size());
-    result.model.detail = encode_blend(mesh.positions, level.vertices, std::move(cells.local), *binding, precision);
+    result.model.detail = encode_blend(std::move(cells.local), *binding);
     result.model.levels.push_back(std::move(level));
     result.model.mesh = std::move(mesh);
     result.model.driver_is_behind = true;
     return result;
 }
 
-Result<Model> bind_to_own_driver(Mesh mesh, Level driver, Precision precision, const RunContext& context) {
+Result<Model> bind_to_own_driver(Mesh mesh, Level driver, const RunContext& context) {
     if (driver.vertices.empty()) return Error{ErrorCode::unsuitable, "The driver has no vertices: nothing to bind to."};
     if (std::optional<Error> error = mesh_error(mesh)) return *error;
     if (std::optional<Error> error = check_level(mesh, driver)) return *error;
@@ -191,11 +191,10 @@ Result<Model> bind_to_own_driver(Mesh mesh, Level driver, Precision precision, c
     if (!work) return work.error();
     std::vector<Level> levels;
     levels.push_back(std::move(driver));
-    return bind_to_levels(std::move(mesh), std::move(levels), *work, precision, context);
+    return bind_to_levels(std::move(mesh), std::move(levels), *work, context);
 }
 
-Result<Model> bind_to_levels(Mesh mesh, std::vector<Level> levels, const WorkingMesh& work, Precision precision,
-                             const RunContext& context) {
+Result<Model> bind_to_levels(Mesh mesh, std::vector<Level> levels, const WorkingMesh& work, const RunContext& context) {
     const Level& driver = levels.front();
     Cells cells = make_cells(driver);
     std::vector<Triangle> over_places = cells.global; // a driver's vertex may lie where an earlier one does
@@ -205,7 +204,7 @@ Result<Model> bind_to_levels(Mesh mesh, std::vector<Level> levels, const Working
         bind_to_driver(work.positions, work.surface, work.normals, over_places, work.surface.triangles, context);
     if (!binding) return binding.error();
     Model model;
-    model.detail = encode_blend(mesh.positions, driver.vertices, std::move(cells.local), *binding, precision);
+    model.detail = encode_blend(std::move(cells.local), *binding);
     model.levels = std::move(levels);
     model.mesh = std::move(mesh);
     split_shared_normals(model.mesh);
@@ -241,8 +240,7 @@ Result<Stripped> strip(Mesh mesh, const StripOptions& options, const RunContext&
     result.report.bind_seconds = now_seconds() - bind_start;
 
     const double encode_start = now_seconds();
-    result.model.detail =
-        encode_blend(mesh.positions, levels.front().vertices, std::move(cells.local), *binding, options.precision);
+    result.model.detail = encode_blend(std::move(cells.local), *binding);
     result.model.levels = std::move(levels);
     result.model.mesh = std::move(mesh);
     split_shared_normals(result.model.mesh);

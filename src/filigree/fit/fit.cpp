@@ -117,8 +117,7 @@ public:
         const std::size_t count = driver.vertices.size();
         std::vector<Level> levels;
         levels.push_back(std::move(driver));
-        Result<Model> model = bind_to_levels(family_.sample_mesh(), std::move(levels), family_.sample_work(),
-                                             Precision::float32, context);
+        Result<Model> model = bind_to_levels(family_.sample_mesh(), std::move(levels), family_.sample_work(), context);
         if (!model) return model.error();
         const auto frame = [&](std::size_t k, std::span<Vec3f> positions) -> Status {
             std::ranges::copy(frames_[k], positions.begin());
@@ -278,7 +277,7 @@ Result<std::size_t> FitWork::size_on_sample() {
 }
 
 Result<Fitted> FitWork::fit_all(std::size_t vertices) {
-    Result<Model> model = bind_to_levels(mesh_, family_->levels(choice_, vertices), work_, Precision::float32, silent_);
+    Result<Model> model = bind_to_levels(mesh_, family_->levels(choice_, vertices), work_, silent_);
     if (!model) return model.error();
     const std::vector<float> bound_u = model->detail.u, bound_v = model->detail.v;
     Result<FittedPoses> poses =

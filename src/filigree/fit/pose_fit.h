@@ -28,7 +28,7 @@ struct PoseFitOptions {
 /// least-squares pose of every frame. R, the prior's weight, decides where M says nothing, as off a flat place.
 class PoseFit {
 public:
-    /// The model must outlive the fit; its detail is float32 or int16. Cost O(V), and the sparse factorisation of four
+    /// The model must outlive the fit; Cost O(V), and the sparse factorisation of four
     /// unknowns a driver vertex: 0.02 s for 1,000, 0.2 s for 3,000. Errors: unsuitable (a number that is not finite),
     /// cancelled.
     static Result<PoseFit> create(const Model& model, const PoseFitOptions& options, const RunContext& context);

@@ -329,8 +329,7 @@ private:
             cells.push_back(named);
         }
         broken_.model.levels = {driver};
-        broken_.model.detail = encode_blend(broken_.model.mesh.positions, driver.vertices, std::move(cells),
-                                            {std::move(bonds_), {}, {}}, detail_.precision);
+        broken_.model.detail = encode_blend(std::move(cells), {std::move(bonds_), {}, {}});
         return std::move(broken_);
     }
 

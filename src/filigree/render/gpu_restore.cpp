@@ -15,48 +15,33 @@ namespace filigree {
 namespace {
 
 constexpr GLuint kRecordInput = 4, kMoreInput = 5;                           // shaders/restore.glsl: vertex inputs
-constexpr GLuint kTransformBinding = 0, kCellBinding = 1, kBlockBinding = 2; // and storage bindings
-constexpr unsigned kBlockBits = 16;                                          // records that count from one cell
-
-std::uint32_t pair(std::int16_t low, std::int16_t high) {
-    return std::uint32_t{static_cast<std::uint16_t>(low)} | std::uint32_t{static_cast<std::uint16_t>(high)} << 16;
-}
+constexpr GLuint kTransformBinding = 0, kCellBinding = 1, kScaleBinding = 2; // and storage bindings
 
 /// What shaders/restore.glsl reads, as it lies in its buffers.
 struct PackedRecords {
     std::size_t words = 0;             ///< of 32 bits, a record
     std::vector<std::uint32_t> inputs; ///< `words` a record
     std::vector<std::array<std::uint32_t, 4>> cells;
-    std::vector<std::uint32_t> blocks; ///< the scale's bits, then the first cell of each block
 };
 
-PackedRecords pack(const blend_kernel::Records& records, float output_scale) {
-    const bool int16 = records.is_int16(), with_normals = !records.normal[0].empty();
+PackedRecords pack(const blend_kernel::Records& records) {
+    const bool with_normals = !records.normal[0].empty();
     PackedRecords packed;
-    packed.words = (int16 ? 3u : 6u) + (with_normals ? 1u : 0u);
+    packed.words = 6u + (with_normals ? 1u : 0u);
     packed.inputs.reserve(packed.words * records.count);
-    packed.blocks.push_back(std::bit_cast<std::uint32_t>(output_scale));
     Index last = kNoIndex;
     for (const blend_kernel::Run& run : records.runs) {
-        if (run.cell != last) { // cells without records are left out: so a block spans no more cells than records
+        if (run.cell != last) { // cells without records are left out
             const Triangle& corners = records.cells[run.cell];
-            const float scale = int16 ? records.scale[run.cell] : 0;
-            packed.cells.push_back({corners[0], corners[1], corners[2], std::bit_cast<std::uint32_t>(scale)});
+            packed.cells.push_back({corners[0], corners[1], corners[2], 0});
             last = run.cell;
         }
         const auto cell = static_cast<std::uint32_t>(packed.cells.size() - 1);
         for (Index r = run.first; r < run.first + run.count; ++r) {
-            if (r % (1u << kBlockBits) == 0) packed.blocks.push_back(cell);
             const auto add = [&](std::uint32_t word) { packed.inputs.push_back(word); };
-            if (int16) {
-                add(pair(records.u16[r], records.v16[r]));
-                add(pair(records.offset[0][r], records.offset[1][r]));
-                add(pair(records.offset[2][r], static_cast<std::int16_t>(cell - packed.blocks.back())));
-            } else {
-                for (float value : {records.u[r], records.v[r], records.q[0][r], records.q[1][r], records.q[2][r]})
-                    add(std::bit_cast<std::uint32_t>(value));
-                add(cell);
-            }
+            for (float value : {records.u[r], records.v[r], records.q[0][r], records.q[1][r], records.q[2][r]})
+                add(std::bit_cast<std::uint32_t>(value));
+            add(cell);
             if (with_normals) add(octahedral({records.normal[0][r], records.normal[1][r], records.normal[2][r]}));
         }
     }
@@ -88,11 +73,11 @@ struct GpuRestorer::Content {
     std::optional<Restorer> driver;     ///< at level 0: for its gradients
     std::optional<BlendRestorer> poses; ///< without items: for its transforms
     std::vector<Index> drawn_at;
-    Precision precision = Precision::float32;
     bool has_normals = false;
     std::size_t stride = 0, bytes = 0;
-    gl::Buffer inputs, transforms, cells, blocks;
-    PackedRecords packed; ///< until they are uploaded
+    gl::Buffer inputs, transforms, cells, scale;
+    PackedRecords packed;            ///< until they are uploaded
+    std::vector<float> output_scale; ///< one number
     std::vector<blend_kernel::VertexTransform> at_rest;
 
     /// pose: one that fits the model.
@@ -118,7 +103,7 @@ Status GpuRestorer::Content::upload() {
     if (Status status = keep(inputs, gl::make_buffer(std::span<const std::uint32_t>(packed.inputs))); !status)
         return status;
     if (Status status = keep(cells, make_storage(packed.cells)); !status) return status;
-    if (Status status = keep(blocks, make_storage(packed.blocks)); !status) return status;
+    if (Status status = keep(scale, make_storage(output_scale)); !status) return status;
     if (Status status = keep(transforms, make_storage(at_rest)); !status) return status;
     packed = {};
     at_rest = std::vector<blend_kernel::VertexTransform>(); // {} would keep the memory
@@ -153,7 +138,6 @@ Result<GpuRestorer> GpuRestorer::prepare(const Model& model, std::span<const Ind
     const BlendDetail& detail = model.detail;
     auto content = std::make_unique<Content>();
     content->model = &model;
-    content->precision = detail.precision;
     content->has_normals = !normals.empty();
     Result<Restorer> driver = Restorer::create(model, {.level = 0}, context);
     if (!driver) return driver.error();
@@ -173,12 +157,13 @@ Result<GpuRestorer> GpuRestorer::prepare(const Model& model, std::span<const Ind
     Pose rest = rest_pose(model);
     rest.gradients.assign(rest.positions.size(), Mat3f::Identity());
     PackedRecords& packed = content->packed;
-    packed = pack(restorer.records(), restorer.output_scale());
+    packed = pack(restorer.records());
+    content->output_scale = {restorer.output_scale()};
     std::vector<blend_kernel::VertexTransform>& at_rest = content->at_rest;
     at_rest = content->transforms_of(rest, context);
     content->stride = packed.words * sizeof(std::uint32_t);
     content->bytes = packed.inputs.size() * sizeof(packed.inputs[0]) + packed.cells.size() * sizeof(packed.cells[0]) +
-                     packed.blocks.size() * sizeof(packed.blocks[0]) + at_rest.size() * sizeof(at_rest[0]);
+                     sizeof(float) + at_rest.size() * sizeof(at_rest[0]);
     return GpuRestorer(std::move(content));
 }
 
@@ -196,13 +181,10 @@ Status GpuRestorer::set_pose(const Pose& pose, const RunContext& context) {
 
 std::size_t GpuRestorer::item_count() const { return content_->drawn_at.size(); }
 std::span<const Index> GpuRestorer::drawn_at() const { return content_->drawn_at; }
-Precision GpuRestorer::precision() const { return content_->precision; }
 bool GpuRestorer::has_normals() const { return content_->has_normals; }
 std::size_t GpuRestorer::bytes() const { return content_->bytes; }
 
-std::string GpuRestorer::shader_source(Precision precision) {
-    return (precision == Precision::int16 ? "#define RESTORE_INT16\n" : "") + std::string(shaders::restore);
-}
+std::string GpuRestorer::shader_source() { return std::string(shaders::restore); }
 
 void GpuRestorer::bind() const {
     const GLint words = static_cast<GLint>(content_->stride / sizeof(std::uint32_t));
@@ -218,7 +200,7 @@ void GpuRestorer::bind() const {
     }
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, kTransformBinding, content_->transforms.name());
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, kCellBinding, content_->cells.name());
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, kBlockBinding, content_->blocks.name());
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, kScaleBinding, content_->scale.name());
 }
 
 Result<GpuRestorer::ReadBack> GpuRestorer::read_back() const {
@@ -233,7 +215,7 @@ Result<GpuRestorer::ReadBack> GpuRestorer::read_back() const {
                                              "void main() { restore_vertex(position, normal); }\n"
                                            : "out vec3 position;\n"
                                              "void main() { position = restored_position(); }\n";
-    const gl::Program::Stage stage{GL_VERTEX_SHADER, "#version 430 core\n" + shader_source(precision()) + main};
+    const gl::Program::Stage stage{GL_VERTEX_SHADER, "#version 430 core\n" + shader_source() + main};
     const char* const outputs[] = {"position", "normal"};
     const std::size_t values = has_normals() ? 2 : 1; // points an item
     const gl::Program program = gl::Program::link({&stage, 1}, std::span(outputs).first(values));

@@ -15,14 +15,14 @@ public:
     /// What to restore: for each item a vertex of the finest mesh and its unit rest normal (`normals` empty: none; a
     /// zero normal stays zero). Several items may share a vertex (with different normals). The model must outlive the
     /// restorer. Starts at rest. Of the options a level is only checked: the items say what is restored.
-    /// Records are float or int16 as the model's are: 24 or 12 bytes an item, and 4 for its normal.
+    /// A record has 24 bytes an item, and 4 for its normal.
     /// Errors: usage (no such level), mismatch (no such vertex, or another number of normals), unsupported (no storage
     /// buffers in vertex shaders), out_of_memory, cancelled.
     static Result<GpuRestorer> create(const Model& model, std::span<const Index> vertices,
                                       std::span<const Vec3f> normals, const RestoreOptions& options,
                                       const RunContext& context);
     /// create in two halves. prepare needs no OpenGL, so any thread will do, and does not say unsupported or
-    /// out_of_memory; of what it gives only drawn_at, item_count, precision, has_normals and upload may be asked.
+    /// out_of_memory; of what it gives only drawn_at, item_count, has_normals and upload may be asked.
     static Result<GpuRestorer> prepare(const Model& model, std::span<const Index> vertices,
                                        std::span<const Vec3f> normals, const RestoreOptions& options,
                                        const RunContext& context);
@@ -45,8 +45,7 @@ public:
     ///     void restore_vertex(out vec3 position, out vec3 normal);   both for little more than the price of one
     /// It takes the vertex inputs 4 and 5, the storage bindings 0 to 2, and names that begin with restore. gl_VertexID
     /// has to be the place of the item: do not draw with another base vertex.
-    static std::string shader_source(Precision precision);
-    Precision precision() const;
+    static std::string shader_source();
     bool has_normals() const;
     /// Binds what shader_source reads: vertex inputs 4 and 5 into the current vertex array, and the storage buffers.
     void bind() const;

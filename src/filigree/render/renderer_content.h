@@ -22,7 +22,7 @@ struct FrameBlock {
 };
 
 struct Renderer::Content {
-    enum class Source { given, float_records, int16_records };
+    enum class Source { given, records };
     /// seen: what lies at each pixel, to be lit later; light: lit as it is drawn.
     enum class Target { seen, light, preview, depth };
     /// What a surface's program is made for: nothing is computed that is not needed.

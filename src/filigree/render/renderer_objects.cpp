@@ -27,10 +27,7 @@ GLuint look_of(const Vec3f& srgb, float gloss) {
 
 std::string Renderer::Content::vertex_source(const Kind& kind) {
     std::string source;
-    if (kind.source != Source::given)
-        source =
-            "#define RESTORED\n" +
-            GpuRestorer::shader_source(kind.source == Source::float_records ? Precision::float32 : Precision::int16);
+    if (kind.source != Source::given) source = "#define RESTORED\n" + GpuRestorer::shader_source();
     source += shaders::frame;
     if (kind.by_vertex) source += std::string(shaders::preview_lighting) + shaders::light_vertex;
     return source + shaders::surface_vertex;
@@ -69,8 +66,7 @@ const Program& Renderer::Content::surface_program(const Kind& kind) {
 }
 
 Renderer::Content::Source Renderer::Content::source_of(const Drawable::Content& drawable) {
-    if (!drawable.restorer()) return Source::given;
-    return drawable.restorer()->precision() == Precision::int16 ? Source::int16_records : Source::float_records;
+    return drawable.restorer() ? Source::records : Source::given;
 }
 
 void Renderer::Content::set_place(const Program& program, const SceneObject& object) const {

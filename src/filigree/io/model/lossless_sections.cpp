@@ -16,9 +16,8 @@ enum class Way : char { plain, numbers, second_order, corners, values, records }
 constexpr std::uint32_t kPoseBlock = 32; ///< frames that are expected from the one before; the first of them is not
 
 bool holds_floats(const std::string& name) {
-    static const std::set<std::string_view> kNames = {"mesh.pos", "uv.val",  "nrm.val",  "col.val",
-                                                      "scal.val", "ck.box",  "bl.u",     "bl.v",
-                                                      "bl.scale", "drv.pos", "pose.pos", "pose.grd"};
+    static const std::set<std::string_view> kNames = {"mesh.pos", "uv.val", "nrm.val", "col.val",  "scal.val",
+                                                      "ck.box",   "bl.u",   "bl.v",    "pose.pos", "pose.grd"};
     return kNames.contains(name);
 }
 
@@ -155,8 +154,7 @@ NumberPlan plan_of(const FileSection& section, const SectionGuide& guide) {
     if (name == "uv.val" || name == "nrm.val" || name == "col.val" || name == "scal.val") {
         return {{}, guide.vertices()};
     }
-    if (name == "bl.u" || name == "bl.v" || name == "bl.u16" || name == "bl.v16" || name == "bl.off16")
-        return {{}, record_expectations(guide, section.index, items)};
+    if (name == "bl.u" || name == "bl.v") return {{}, record_expectations(guide, section.index, items)};
     if (is_of_poses(name) && section.index % kPoseBlock != 0) {
         std::vector<std::uint32_t> before = guide.words(name, section.index - 1);
         if (before.size() * sizeof(std::uint32_t) == section.count * section.item_size)

@@ -46,7 +46,7 @@ struct ModelChunks::Content {
     std::string name;
     std::optional<SectionReader> sections; ///< of the file
     Model driver;
-    BlendDetail shared; ///< what all chunks have: cells, their scales, the precision
+    BlendDetail shared; ///< what all chunks have: cells
     std::vector<FileBox> boxes;
     std::size_t vertices = 0;     ///< of the mesh
     std::size_t all_vertices = 0; ///< in the file: with those of a driver behind them
@@ -65,15 +65,11 @@ BlendRestorer ModelChunks::Content::restorer(std::size_t k, const RunContext& co
     for (std::size_t r = 0; r < count; ++r)
         if (!(std::abs(detail.u[r]) <= 1 && std::abs(detail.v[r]) <= 1))
             throw FileDamage{"is inconsistent: a weight is out of range"};
-    if (detail.precision == Precision::float32) {
-        const std::vector<Vec3f> own = sections->array<Vec3f>("mesh.pos", static_cast<std::uint32_t>(k));
-        if (own.size() != count) throw FileDamage{"is inconsistent: a chunk lacks positions"};
-        for (const Vec3f& p : own)
-            if (!p.allFinite()) throw FileDamage{"is inconsistent: a position is not finite"};
-        positions.insert(positions.end(), own.begin(), own.end());
-    } else {
-        positions.resize(drivers + count, driver.mesh.positions.front());
-    }
+    const std::vector<Vec3f> own = sections->array<Vec3f>("mesh.pos", static_cast<std::uint32_t>(k));
+    if (own.size() != count) throw FileDamage{"is inconsistent: a chunk lacks positions"};
+    for (const Vec3f& p : own)
+        if (!p.allFinite()) throw FileDamage{"is inconsistent: a position is not finite"};
+    positions.insert(positions.end(), own.begin(), own.end());
     std::vector<BlendRestorer::Item> items(std::min(count, vertices - k * kChunkVertices));
     for (Index i = 0; i < items.size(); ++i) items[i] = {drivers + i, i};
     return BlendRestorer(detail, positions, driver.driver().vertices, items, {}, context);
@@ -113,17 +109,12 @@ Result<ModelChunks> ModelChunks::open(FileReader file, const std::string& name, 
         content->boxes = in.array<FileBox>("ck.box");
         if (content->boxes.size() != chunk_count(content->all_vertices))
             throw FileDamage{"is inconsistent: there is not one box a chunk"};
-        content->shared.precision = outline->precision;
         content->shared.cells = in.array<Triangle>("bl.cell");
-        content->shared.cell_scales = in.array<float>("bl.scale");
         if (content->shared.cells.empty()) throw FileDamage{"is inconsistent: it has no cells"};
         for (const Triangle& cell : content->shared.cells)
             for (const Index v : cell)
                 if (v >= driver->vertex_count())
                     throw FileDamage{"is inconsistent: a cell names a driver vertex that is not there"};
-        if (outline->precision == Precision::int16 &&
-            content->shared.cell_scales.size() != content->shared.cells.size())
-            throw FileDamage{"is inconsistent: there is not one scale a cell"};
     } catch (const FileDamage& damage) {
         return error_of(damage, name);
     } catch (const Error& error) {

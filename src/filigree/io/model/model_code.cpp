@@ -74,7 +74,7 @@ Model bind_elsewhere(const SectionReader& in, Mesh mesh, const FileCode& code, c
     driver.corners = level.corners;
     if (!std::ranges::all_of(driver.positions, [](const Vec3f& p) { return p.allFinite(); }))
         throw FileDamage{"has a damaged driver"};
-    Result<Stripped> bound = strip_to_driver(std::move(mesh), driver, static_cast<Precision>(code.precision), context);
+    Result<Stripped> bound = strip_to_driver(std::move(mesh), driver, context);
     if (!bound) throw bound.error();
     return std::move(bound->model);
 }
@@ -212,7 +212,7 @@ Result<PackedModel> code_model(const Model& model, const PoseSequence& poses, co
                   .bits = options.bits,
                   .surface = options.surface,
                   .keep_order = options.keep_order,
-                  .precision = static_cast<std::uint32_t>(model.detail.precision),
+                  .unused = 0,
                   .driver_vertices = driver.vertices.size(),
                   .driver_faces = driver.face_count(),
                   .driver_corners = driver.corners.size()};
@@ -287,7 +287,7 @@ FileCode read_file_code(const SectionReader& in) {
         throw FileDamage{"was packed by another version of filigree", "pack its source again"};
     const auto code = in.value<FileCode>("cd.par");
     const std::uint64_t most_driver = is_made_elsewhere(in) ? in.item_count<Vec3f>("cd.dpos") : code.vertices;
-    if (code.precision > 1 || code.bits > 16 || code.driver_vertices == 0 || code.driver_vertices > most_driver ||
+    if (code.bits > 16 || code.driver_vertices == 0 || code.driver_vertices > most_driver ||
         (is_made_elsewhere(in) && code.driver_vertices != most_driver) || code.vertices >= kNoIndex)
         throw FileDamage{"has packed parts that make no sense"};
     in.require_room(unpacked_bytes(code));
@@ -397,8 +397,7 @@ Model read_model_code(const SectionReader& in, Mesh rest, const RunContext& cont
     Level driver = driver_of(in, code);
     if (code.keep_order && !std::ranges::is_sorted(driver.vertices)) throw FileDamage{"has a damaged driver"};
     if (!code.keep_order) *mesh = with_driver_first(std::move(*mesh), driver, context);
-    Result<Model> model =
-        bind_to_own_driver(std::move(*mesh), std::move(driver), static_cast<Precision>(code.precision), context);
+    Result<Model> model = bind_to_own_driver(std::move(*mesh), std::move(driver), context);
     if (!model) throw model.error();
     return std::move(*model);
 }

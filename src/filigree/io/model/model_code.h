@@ -16,7 +16,7 @@ struct FileCode {
     std::uint64_t vertices, faces, corners;
     std::array<double, 3> low;
     double step;
-    std::uint32_t bits, surface, keep_order, precision;
+    std::uint32_t bits, surface, keep_order, unused;
     std::uint64_t driver_vertices, driver_faces, driver_corners;
 };
 static_assert(sizeof(FileCode) == 96);

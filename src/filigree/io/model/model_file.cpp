@@ -17,18 +17,22 @@ namespace filigree {
 
 namespace {
 
+constexpr std::uint32_t kFloatRecords = 0, kInt16Records = 1; // bl.prec
+
+/// Throws where the records are not floats. Programs before 0.1.0 wrote int16 records, too.
+void require_float_records(const SectionReader& in) {
+    const auto kind = in.value<std::uint32_t>("bl.prec");
+    if (kind == kInt16Records)
+        throw FileDamage{"has int16 records, which are no longer read",
+                         "strip the mesh again, and run `filigree pack --profile runtime` for a small file",
+                         ErrorCode::unsuitable};
+    if (kind != kFloatRecords) throw FileDamage{"has records of a kind that is not known"};
+}
+
 void write_blend(SectionWriter& out, const Model& model, const BlendDetail& detail) {
-    out.value("bl.prec", static_cast<std::uint32_t>(detail.precision));
+    out.value("bl.prec", kFloatRecords);
     out.array("bl.cell", detail.cells);
-    if (detail.precision == Precision::float32) {
-        write_chunk_records(out, detail, model.mesh.positions);
-    } else { // boxes are of the positions that are read back
-        std::vector<Vec3f> decoded = model.mesh.positions;
-        decode_rest(detail, model.driver().vertices, decoded);
-        write_chunk_records(out, detail, decoded);
-        out.array("bl.scale", detail.cell_scales);
-        out.array("drv.pos", driver_positions(model));
-    }
+    write_chunk_records(out, detail, model.mesh.positions);
     out.array("bl.gap", detail.across_gap);
     out.array("bl.away", detail.facing_away);
 }
@@ -74,11 +78,7 @@ bool has_driver_behind(const SectionReader& in) { return !in.array<std::uint32_t
 
 BlendDetail read_blend(const SectionReader& in) {
     BlendDetail detail;
-    const auto precision = in.value<std::uint32_t>("bl.prec");
-    if (precision > 1) throw FileDamage{"has records of a precision that is not known"};
-    detail.precision = static_cast<Precision>(precision);
     detail.cells = in.array<Triangle>("bl.cell");
-    if (detail.precision == Precision::int16) detail.cell_scales = in.array<float>("bl.scale");
     const auto vertices = in.value<std::uint64_t>("mesh.num");
     if (vertices >= kNoIndex || chunk_count(vertices) != in.count("bl.run").first)
         throw FileDamage{"is inconsistent: there are not as many chunks as its vertices fill"};
@@ -130,29 +130,15 @@ Model read_sections(const FileReader& file, const std::string& name, const RunCo
     if (has_reference_code(in))
         throw Error{ErrorCode::unsuitable, name + ": has the report's reference code, which this cannot work with; "
                                                   "strip its mesh with the blend code."};
+    require_float_records(in);
     Model model;
     model.mesh = read_mesh_sections(in);
     model.source_order = in.array<Index>("mesh.ord");
     model.driver_is_behind = has_driver_behind(in);
     model.levels = read_level_sections(in);
     model.detail = read_blend(in);
-
-    // Float models hold every position. int16 models hold the driver's positions alone; the others come from the
-    // records, once those are known to be sound.
-    const std::vector<Vec3f> driver = in.array<Vec3f>("drv.pos");
-    const auto vertex_count = in.value<std::uint64_t>("mesh.num");
-    if (driver.empty() && vertex_count != model.mesh.vertex_count())
+    if (in.value<std::uint64_t>("mesh.num") != model.mesh.vertex_count())
         throw FileDamage{"does not have as many positions as it says"};
-    if (!driver.empty()) {
-        if (vertex_count != model.detail.order.size() || model.levels.empty() ||
-            driver.size() != model.driver().vertices.size() || model.detail.precision != Precision::int16)
-            throw FileDamage{"has records that do not fit its vertices"};
-        model.mesh.positions.assign(vertex_count, Vec3f::Zero());
-        for (std::size_t i = 0; i < driver.size(); ++i)
-            if (model.driver().vertices[i] < vertex_count) model.mesh.positions[model.driver().vertices[i]] = driver[i];
-        if (const std::string wrong = check_model(model); !wrong.empty()) throw FileDamage{"is inconsistent: " + wrong};
-        decode_rest(model.detail, model.driver().vertices, model.mesh.positions);
-    }
     if (const std::string wrong = check_model(model); !wrong.empty()) throw FileDamage{"is inconsistent: " + wrong};
     return model;
 }
@@ -201,7 +187,6 @@ ModelOutline read_outline_sections(const FileReader& file) {
         const FileCode code = read_file_code(in);
         outline.levels = {{code.driver_vertices, code.driver_faces, code.driver_corners},
                           {code.vertices, code.faces, code.corners}};
-        outline.precision = static_cast<Precision>(code.precision);
         outline.coding = coding_of(in, code);
         read_frames(in, outline);
         outline.bytes = file.size();
@@ -228,9 +213,7 @@ ModelOutline read_outline_sections(const FileReader& file) {
         outline.references = in.value<std::array<std::uint32_t, 2>>("rf.par")[1];
         outline.patches = in.item_count<std::array<Index, 4>>("rf.base");
     } else {
-        const auto precision = in.value<std::uint32_t>("bl.prec");
-        if (precision > 1) throw FileDamage{"has records of a precision that is not known"};
-        outline.precision = static_cast<Precision>(precision);
+        require_float_records(in);
         outline.across_gap = in.array<Index>("bl.gap");
         outline.facing_away = in.array<Index>("bl.away");
     }
@@ -262,13 +245,14 @@ Mesh read_one_level(const FileReader& file, unsigned k, const std::string& name,
     if (k > level_count)
         throw Error{ErrorCode::usage, "The model has levels 0 to " + std::to_string(level_count) +
                                           "; there is no level " + std::to_string(k) + "."};
-    const bool is_reference = !is_coded(in) && has_reference_code(in), has_positions = in.count("mesh.pos").first > 0;
-    if (!is_reference && (k == level_count || !has_positions)) return level_mesh(read_sections(file, name, context), k);
+    const bool is_reference = !is_coded(in) && has_reference_code(in);
+    if (!is_reference && (is_coded(in) || k == level_count)) return level_mesh(read_sections(file, name, context), k);
     if (k == level_count) {
         Mesh finest = read_mesh_sections(in);
         if (const std::string wrong = check_mesh(finest); !wrong.empty()) throw FileDamage{"is inconsistent: " + wrong};
         return finest;
     }
+    if (!is_reference) require_float_records(in);
     const std::vector<Index> vertices = in.array<Index>("lev.vert", k);
     if (!std::is_sorted(vertices.begin(), vertices.end()))
         throw FileDamage{"is inconsistent: a level's vertices do not ascend"};
@@ -303,7 +287,7 @@ bool is_model_file(const FileReader& file) {
 namespace {
 
 void write_sections(SectionWriter& out, const Model& model, const PoseSequence& poses) {
-    write_mesh_sections(out, model.mesh, model.detail.precision == Precision::float32);
+    write_mesh_sections(out, model.mesh, true);
     out.array("mesh.ord", model.source_order);
     if (model.driver_is_behind) out.value("mesh.drv", std::uint32_t{1});
     out.value("code", kBlendCode);

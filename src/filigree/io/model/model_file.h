@@ -22,9 +22,8 @@ Result<Model> read_model(const FileReader& file, const std::string& name, const 
 
 /// What a model file says of its model.
 struct ModelOutline {
-    std::vector<LevelCounts> levels; ///< coarse to fine, with the finest
-    bool driver_is_behind = false;   ///< see Model; of a coded file false
-    Precision precision = Precision::float32;
+    std::vector<LevelCounts> levels;            ///< coarse to fine, with the finest
+    bool driver_is_behind = false;              ///< see Model; of a coded file false
     std::vector<Index> across_gap, facing_away; ///< as in BlendDetail
     unsigned references = 0;                    ///< 3, 4 or 6: a file of the reference code (io/model/reference_file.h)
     std::size_t patches = 0;                    ///< of the reference code
@@ -38,9 +37,8 @@ struct ModelOutline {
 /// Reads the outline alone: as fast for a large model as for a small one. read_model finds out whether all sections fit
 /// together. Errors: those of read_model.
 Result<ModelOutline> read_model_outline(const FileReader& file, const std::string& name, const RunContext& context);
-/// Reads the part of the file that a level needs (int16 records: the whole file). The same mesh as level_mesh.
-/// Positions and attributes are read in part, so their checksums are not compared. Errors: those of read_model, usage
-/// (no such level).
+/// Reads the part of the file that a level needs. The same mesh as level_mesh. Positions and attributes are read in
+/// part, so their checksums are not compared. Errors: those of read_model, usage (no such level).
 Result<Mesh> read_model_level(const FileReader& file, unsigned level, const std::string& name,
                               const RunContext& context);
 

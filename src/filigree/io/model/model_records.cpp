@@ -7,13 +7,6 @@ namespace {
 static_assert(sizeof(FileRun) == 8);
 static_assert(sizeof(FileBox) == 24);
 
-std::vector<std::int16_t> steps_of(const std::vector<float>& weights, std::span<const Index> records) {
-    std::vector<std::int16_t> steps;
-    steps.reserve(records.size());
-    for (const Index r : records) steps.push_back(static_cast<std::int16_t>(std::lround(weights[r] * 32767.0f)));
-    return steps;
-}
-
 template <class T>
 std::vector<T> pick(const std::vector<T>& from, std::span<const Index> records) {
     std::vector<T> picked;
@@ -27,29 +20,14 @@ struct ChunkSections {
     std::vector<FileRun> runs;
     std::vector<std::uint16_t> from; ///< of each vertex: which record of its block is its own
     std::vector<float> u, v;
-    std::vector<std::array<std::int16_t, 3>> offsets;
 };
-
-std::vector<float> weights_of(const std::vector<std::int16_t>& steps) {
-    std::vector<float> weights;
-    weights.reserve(steps.size());
-    for (const std::int16_t step : steps) weights.push_back(float(step) * (1.0f / 32767.0f));
-    return weights;
-}
 
 ChunkSections read_chunk(const SectionReader& in, std::uint32_t k, std::size_t vertices, const BlendDetail& detail) {
     ChunkSections chunk;
     chunk.runs = in.array<FileRun>("bl.run", k);
     chunk.from = in.array<std::uint16_t>("bl.from", k);
-    if (detail.precision == Precision::float32) {
-        chunk.u = in.array<float>("bl.u", k);
-        chunk.v = in.array<float>("bl.v", k);
-    } else {
-        chunk.u = weights_of(in.array<std::int16_t>("bl.u16", k));
-        chunk.v = weights_of(in.array<std::int16_t>("bl.v16", k));
-        chunk.offsets = in.array<std::array<std::int16_t, 3>>("bl.off16", k);
-        if (chunk.offsets.size() != vertices) throw FileDamage{"is inconsistent: there is not one offset a vertex"};
-    }
+    chunk.u = in.array<float>("bl.u", k);
+    chunk.v = in.array<float>("bl.v", k);
     if (chunk.from.size() != vertices || chunk.u.size() != vertices || chunk.v.size() != vertices)
         throw FileDamage{"is inconsistent: there is not one record a vertex"};
     std::size_t records = 0; // so far
@@ -111,14 +89,8 @@ void write_chunk_records(SectionWriter& out, const BlendDetail& detail, std::spa
         }
         out.array("bl.run", std::move(chunk.runs), k);
         out.array("bl.from", std::move(chunk.from), k);
-        if (detail.precision == Precision::float32) {
-            out.array("bl.u", pick(detail.u, chosen), k);
-            out.array("bl.v", pick(detail.v, chosen), k);
-        } else {
-            out.array("bl.u16", steps_of(detail.u, chosen), k);
-            out.array("bl.v16", steps_of(detail.v, chosen), k);
-            out.array("bl.off16", pick(detail.offsets, chosen), k);
-        }
+        out.array("bl.u", pick(detail.u, chosen), k);
+        out.array("bl.v", pick(detail.v, chosen), k);
     }
 }
 
@@ -138,7 +110,6 @@ void read_chunk_records(const SectionReader& in, std::size_t first, std::size_t 
     detail.order.resize(count);
     detail.u.resize(count);
     detail.v.resize(count);
-    if (detail.precision == Precision::int16) detail.offsets.resize(count);
     for (ChunkSections& chunk : chunks) {
         const std::vector<Index> vertex_of = vertices_of(chunk);
         std::size_t record = 0;
@@ -148,7 +119,6 @@ void read_chunk_records(const SectionReader& in, std::size_t first, std::size_t 
                 detail.order[to] = base + vertex_of[record];
                 detail.u[to] = chunk.u[record];
                 detail.v[to] = chunk.v[record];
-                if (!detail.offsets.empty()) detail.offsets[to] = chunk.offsets[record];
             }
         base += static_cast<Index>(chunk.from.size());
         chunk = {};

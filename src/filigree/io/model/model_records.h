@@ -25,7 +25,7 @@ struct FileBox {
 void write_chunk_records(SectionWriter& out, const BlendDetail& detail, std::span<const Vec3f> positions);
 
 /// The records of the chunks first to last - 1 as a detail of their vertices alone: the first of them is vertex `base`
-/// there. Cells, their scales and the precision are detail's already. Throws FileDamage where they do not fit together.
+/// there. Cells are detail's already. Throws FileDamage where they do not fit together.
 /// vertices: of the whole model.
 void read_chunk_records(const SectionReader& in, std::size_t first, std::size_t last, std::size_t vertices, Index base,
                         BlendDetail& detail);

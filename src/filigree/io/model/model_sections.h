@@ -148,10 +148,11 @@ private:
 /// What is wrong with a file, thrown inside the reading of models only and turned into an Error at its door.
 struct FileDamage {
     std::string what, remedy = "strip the mesh again";
+    ErrorCode code = ErrorCode::bad_file;
 };
 
 inline Error error_of(const FileDamage& damage, const std::string& name) {
-    return {ErrorCode::bad_file, name + " " + damage.what + "; " + damage.remedy + "."};
+    return {damage.code, name + " " + damage.what + "; " + damage.remedy + "."};
 }
 
 class SectionReader {

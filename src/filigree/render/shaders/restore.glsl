@@ -1,34 +1,19 @@
 // Restores the record of this vertex: blend/blend_kernel.cpp in GLSL. GpuRestorer::bind fills what is read here.
 
-#ifdef RESTORE_INT16
-layout(location = 4) in uvec4 restore_record; // u v, x y, z and cell (two of 16 bits each); normal
-#else
 layout(location = 4) in uvec4 restore_record; // u, v, q.x, q.y
 layout(location = 5) in uvec3 restore_more;   // q.z, cell, normal
-#endif
 
 // A driver vertex: t, the columns of A, half its rest position, and one float that nobody reads.
 layout(std430, binding = 0) restrict readonly buffer RestoreTransforms { mat4 restore_transforms[]; };
-// A cell: its three driver vertices, and for int16 the size of an offset's step as the bits of a float.
+// A cell: its three driver vertices, and one number that nobody reads.
 layout(std430, binding = 1) restrict readonly buffer RestoreCells { uvec4 restore_cells[]; };
-// For int16 the cell of every 65536th record, from which the others count.
-layout(std430, binding = 2) restrict readonly buffer RestoreBlocks {
-    float restore_scale; // of restored positions
-    uint restore_first_cells[];
-};
-
-// Two signed integers of 16 bits, the low one first.
-vec2 restore_shorts(uint bits) { return vec2(ivec2(int(bits << 16), int(bits)) >> 16); }
+layout(std430, binding = 2) restrict readonly buffer RestoreScale { float restore_scale; }; // of restored positions
 
 // Octahedral [Cigolle 2014]; not yet of unit length.
 vec3 restore_rest_normal() {
-#ifdef RESTORE_INT16
-    uint bits = restore_record.w;
-#else
     uint bits = restore_more.z;
-#endif
     if (bits == 0x80008000u) return vec3(0.0); // a zero normal stays zero
-    vec2 e = restore_shorts(bits) * (1.0 / 32767.0);
+    vec2 e = vec2(ivec2(int(bits << 16), int(bits)) >> 16) * (1.0 / 32767.0); // two signed integers of 16 bits
     vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
     float fold = max(-n.z, 0.0);
     n.xy += mix(vec2(fold), vec2(-fold), greaterThanEqual(n.xy, vec2(0.0)));
@@ -37,21 +22,11 @@ vec3 restore_rest_normal() {
 
 // The three driver vertices' transforms by the record's weights; its point before them.
 void restore_blend(out mat4 transform, out vec3 q) {
-#ifdef RESTORE_INT16
-    vec2 weights = restore_shorts(restore_record.x) * (1.0 / 32767.0);
-    uvec4 cell = restore_cells[restore_first_cells[gl_VertexID >> 16] + (restore_record.z >> 16)];
-#else
     vec2 weights = uintBitsToFloat(restore_record.xy);
     uvec4 cell = restore_cells[restore_more.y];
-#endif
     mat4 t0 = restore_transforms[cell.x];
     transform = t0 + weights.x * (restore_transforms[cell.y] - t0) + weights.y * (restore_transforms[cell.z] - t0);
-#ifdef RESTORE_INT16
-    vec3 steps = vec3(restore_shorts(restore_record.y), restore_shorts(restore_record.z).x);
-    q = steps * uintBitsToFloat(cell.w) + transform[3].xyz;
-#else
     q = uintBitsToFloat(uvec3(restore_record.zw, restore_more.x));
-#endif
 }
 
 mat3 restore_gradient(mat4 transform) {

@@ -51,6 +51,6 @@ export async function compare(url) {
         farthest = Math.max(farthest, shader.getVertexPosition(v, place).distanceTo(
             exact.fromBufferAttribute(processor.geometry.attributes.position, v)));
     const middle = box.getCenter(place);
-    return { covered, different, moved, farthest, inSphere: shader.boundingSphere.containsPoint(middle) &&
+    return { covered, different, moved, farthest, holds: shader.boundingSphere.containsPoint(middle) &&
         shader.boundingSphere.radius < 3 * Math.max(...corners.map((c) => c.distanceTo(middle))) };
 }
