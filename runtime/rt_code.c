@@ -1200,6 +1200,10 @@ static FLG_COLD void read_poses(flg_reading* r, const uint32_t* driver_corners) 
     flg_faces faces;
     void* scratch;
     if (!head || w->status != FLG_OK) return;
+    if (count != 1) {
+        walk_fails(w, FLG_DAMAGED);
+        return;
+    }
     frames = head[0];
     numbers = head[1];
     if ((numbers != 3 && numbers != 12) ||

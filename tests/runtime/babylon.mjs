@@ -1,12 +1,13 @@
-// The mesh of Babylon.js follows a model: vertices are drawn once for each normal and UV they have.
+// What follows a model in Babylon.js: vertices are drawn once for each normal and UV they have.
 //   node babylon.mjs PACKAGE_FOLDER MODEL.fil...
 import { readFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 
 const [folder, ...paths] = process.argv.slice(2);
 const { Model } = await import(pathToFileURL(`${folder}/filigree.js`));
-const { RestoredMesh } = await import("filigree/babylon");
+const { RestoredGeometry } = await import("filigree/babylon");
 const { NullEngine } = await import("@babylonjs/core/Engines/nullEngine.js");
+const { Mesh } = await import("@babylonjs/core/Meshes/mesh.js");
 const { Scene } = await import("@babylonjs/core/scene.js");
 
 function check(holds, what) {
@@ -16,9 +17,10 @@ function check(holds, what) {
 const scene = new Scene(new NullEngine());
 for (const path of paths) {
     const model = await Model.open(readFileSync(path));
-    const mesh = new RestoredMesh("restored", model, scene);
+    const geometry = new RestoredGeometry("restored", model, scene), mesh = new Mesh("restored", scene);
+    geometry.applyToMesh(mesh);
     const narrow = mesh.getBoundingInfo().boundingBox.maximum.x;
-    mesh.update(model.driverRest.map((x, k) => (k % 3 === 0 ? 2 * x : x)));
+    geometry.update(model.driverRest.map((x, k) => (k % 3 === 0 ? 2 * x : x)));
     const positions = mesh.getVerticesData("position"), normals = mesh.getVerticesData("normal"), uvs = mesh.getVerticesData("uv");
     const indices = mesh.getIndices();
     check(indices.length === 3 * model.info.triangles, "every triangle is drawn");
