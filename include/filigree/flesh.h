@@ -229,8 +229,7 @@ struct FleshMeasure {
     Index furthest_joint = kNoIndex; ///< that carries most of that vertex
     bool is_closed = true;           ///< volumes of an open surface are those of the cones from its middle
 };
-/// overlap_frames: how many frames are looked at for overlaps, 0: none. Cost O(V) a frame, and about a second for each
-/// of these. Errors: cancelled.
+/// overlap_frames: how many frames are looked at for overlaps, 0: none. Cost O(V) a frame. Errors: cancelled.
 Result<FleshMeasure> measure_flesh(const Flesh& flesh, const FleshClip& clip, std::size_t overlap_frames = 4,
                                    const RunContext& context = RunContext());
 

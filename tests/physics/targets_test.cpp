@@ -291,6 +291,9 @@ TEST(Targets, RefusesWhatCannotFollow) {
     wrong.leash = {0};
     EXPECT_NE(code(one.sim().set_follow(0, wrong, at, at)).find("leash"), std::string::npos);
     wrong = one.follow;
+    wrong.contact_gap = -1;
+    EXPECT_NE(code(one.sim().set_follow(0, wrong, at, at)).find("contact_gap"), std::string::npos);
+    wrong = one.follow;
     wrong.passing = {{0, 1}};
     EXPECT_NE(code(one.sim().set_follow(0, wrong, at, at)).find("groups"), std::string::npos);
     Vectors lost = at;

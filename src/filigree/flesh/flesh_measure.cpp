@@ -1,21 +1,18 @@
 // Volumes, overlaps and distances of flesh beside its skin.
 #include "filigree/core/parallel_for.h"
 #include "filigree/flesh.h"
-#include "filigree/sample.h"
-#include "filigree/sample/winding_tree.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <tuple>
 
 namespace filigree {
 
 namespace {
 
-constexpr double kOverlapStep = 0.5; ///< spacings, between the points that are looked at for overlaps
-constexpr double kTwice = 1.5;       ///< winding number
-constexpr double kAccuracy = 0.05;   ///< of winding numbers
+constexpr double kOverlapStep = 0.125; ///< spacings, between the lines that are looked at for overlaps
 
 /// Of the cones from a point near by, so that it keeps its digits.
 double volume_of(std::span<const Vec3f> positions, std::span<const Triangle> triangles) {
@@ -28,25 +25,82 @@ double volume_of(std::span<const Vec3f> positions, std::span<const Triangle> tri
     return sum / 6;
 }
 
-/// Volume that is enclosed twice or more, model units.
-Result<double> overlap_of(std::span<const Vec3f> positions, std::span<const Triangle> triangles, double step,
-                          const RunContext& context) {
-    const Result<WindingTree> tree = WindingTree::create(positions, triangles, kAccuracy, context);
-    if (!tree) return tree.error();
+/// Where a line goes through the surface.
+struct Crossing {
+    std::uint32_t line;
+    float at;
+    std::int8_t in; ///< 1: inwards, -1: out
+};
+
+/// Volume that is enclosed twice or more, model units: the mean of three sums, each over lines along an axis, so far
+/// apart as step. Exact along a line. Lines that end inside, as through the holes of an open surface, count nothing.
+double overlap_of(std::span<const Vec3f> positions, std::span<const Triangle> triangles, double step,
+                  const RunContext& context) {
     Box box;
     for (const Triangle& t : triangles)
         for (const Index v : t) box.extend(positions[v].cast<double>());
-    const Result<Lattice> lattice = make_lattice(box, {.spacing = step});
-    if (!lattice) return 0.0; // flat
-    const auto [nx, ny, nz] = lattice->counts();
-    std::vector<std::size_t> twice(ny * nz);
-    parallel_for(context, twice.size(), 4, [&, nx = nx, ny = ny](std::size_t begin, std::size_t end) {
-        for (std::size_t row = begin; row < end && !context.is_cancelled(); ++row)
-            for (std::size_t i = 0; i < nx; ++i)
-                twice[row] += std::abs(tree->winding(lattice->point(i, row % ny, row / ny))) > kTwice;
+    std::array<double, 3> sums{};
+    parallel_for(context, 3, 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t axis = begin; axis < end; ++axis) {
+            const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
+            // Between the lines of anything regular.
+            const double first_u = box.min[u] + 0.4142 * step, first_v = box.min[v] + 0.7321 * step;
+            const auto count = [&](std::size_t k) { return std::size_t(box.size()[k] / step) + 1; };
+            const std::size_t lines_u = count(u), lines_v = count(v);
+            std::vector<Crossing> crossings;
+            for (const Triangle& t : triangles) {
+                if (context.is_cancelled()) return;
+                std::array<Vec3d, 3> p; // u, v, along
+                for (int k = 0; k < 3; ++k) {
+                    const Vec3d q = positions[t[k]].cast<double>();
+                    p[k] = {q[u], q[v], q[axis]};
+                }
+                const auto cross = [](const Vec3d& a, const Vec3d& b, double x, double y) {
+                    return (b.x() - a.x()) * (y - a.y()) - (b.y() - a.y()) * (x - a.x());
+                };
+                const double area = cross(p[0], p[1], p[2].x(), p[2].y());
+                if (area == 0) continue;
+                // On an edge, a line goes through one of its two triangles.
+                const auto is_left = [&](const Vec3d& a, const Vec3d& b, double x, double y) {
+                    const bool forth = a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
+                    return forth ? cross(a, b, x, y) >= 0 : cross(b, a, x, y) < 0;
+                };
+                const auto range = [&](int k, double first, std::size_t lines) {
+                    const auto [low, high] = std::minmax({p[0][k], p[1][k], p[2][k]});
+                    const auto from = std::max(0.0, std::ceil((low - first) / step));
+                    const auto to = std::min(double(lines), std::floor((high - first) / step) + 1);
+                    return std::array{std::size_t(from), std::size_t(std::max(from, to))};
+                };
+                const auto [i0, i1] = range(0, first_u, lines_u);
+                const auto [j0, j1] = range(1, first_v, lines_v);
+                for (std::size_t j = j0; j < j1; ++j)
+                    for (std::size_t i = i0; i < i1; ++i) {
+                        const double x = first_u + double(i) * step, y = first_v + double(j) * step;
+                        const bool left = is_left(p[0], p[1], x, y);
+                        if (is_left(p[1], p[2], x, y) != left || is_left(p[2], p[0], x, y) != left) continue;
+                        if (left != (area > 0)) continue;
+                        const double b1 = cross(p[2], p[0], x, y) / area, b2 = cross(p[0], p[1], x, y) / area;
+                        const double at = p[0].z() + b1 * (p[1].z() - p[0].z()) + b2 * (p[2].z() - p[0].z());
+                        crossings.push_back({std::uint32_t(i + j * lines_u), float(at), std::int8_t(left ? -1 : 1)});
+                    }
+            }
+            std::ranges::sort(crossings, [](const Crossing& a, const Crossing& b) {
+                return std::tuple(a.line, a.at, -a.in) < std::tuple(b.line, b.at, -b.in);
+            });
+            for (std::size_t k = 0; k < crossings.size();) {
+                int depth = 0;
+                double twice = 0;
+                std::size_t next = k;
+                for (; next < crossings.size() && crossings[next].line == crossings[k].line; ++next) {
+                    if (std::abs(depth) > 1) twice += double(crossings[next].at) - double(crossings[next - 1].at);
+                    depth += crossings[next].in;
+                }
+                if (depth == 0) sums[axis] += twice;
+                k = next;
+            }
+        }
     });
-    if (context.is_cancelled()) return cancelled_error();
-    return double(std::accumulate(twice.begin(), twice.end(), std::size_t{0})) * step * step * step;
+    return (sums[0] + sums[1] + sums[2]) / 3 * step * step;
 }
 
 bool is_closed(std::span<const Vec3f> positions, std::span<const Triangle> triangles) {
@@ -88,9 +142,7 @@ Result<FleshMeasure> measure_flesh(const Flesh& flesh, const FleshClip& clip, st
     measure.most_volume = measure.skin_most_volume = -1e9;
     double bind = 0;
     if (overlap_frames > 0) {
-        const Result<double> found = overlap_of(flesh.surface().positions, triangles, step, context);
-        if (!found) return found.error();
-        bind = *found;
+        bind = overlap_of(flesh.surface().positions, triangles, step, context);
         measure.bind_overlap = bind / std::abs(rest);
     }
     const std::size_t frames = clip.frames.size();
@@ -121,9 +173,8 @@ Result<FleshMeasure> measure_flesh(const Flesh& flesh, const FleshClip& clip, st
         if (overlap_frames == 0 || frame % every != every / 2) continue;
         for (const auto& [positions, overlap] :
              {std::pair(&soft, &measure.overlap), std::pair(&plain, &measure.skin_overlap)}) {
-            const Result<double> found = overlap_of(*positions, triangles, step, context);
-            if (!found) return found.error();
-            *overlap = std::max(*overlap, (*found - bind) / std::abs(rest));
+            const double found = overlap_of(*positions, triangles, step, context);
+            *overlap = std::max(*overlap, (found - bind) / std::abs(rest));
         }
     }
     return measure;

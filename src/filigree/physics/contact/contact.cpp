@@ -49,6 +49,7 @@ void Contacts::make_ready(const BodyState& state, std::size_t body, std::size_t 
         matter_.resize(body + 1, std::make_shared<const BodyMatter>());
         own_cells_.resize(body + 1);
         passing_.resize(body + 1);
+        own_gaps_.resize(body + 1);
         recovers_.resize(body + 1);
         touched_.resize(body + 1);
         loads_.resize(body + 1);
@@ -78,6 +79,7 @@ void Contacts::remove_body(std::span<const BodyState> bodies, std::size_t body) 
     matter_[body] = std::make_shared<const BodyMatter>();
     own_cells_[body] = nullptr;
     passing_[body] = nullptr;
+    own_gaps_[body] = 0;
     recovers_[body] = touched_[body] = 0;
     motions_.remove_body(body);
     list_work(bodies);
@@ -86,6 +88,14 @@ void Contacts::remove_body(std::span<const BodyState> bodies, std::size_t body) 
 void Contacts::set_passing(std::size_t body, std::shared_ptr<const OwnCells::Passing> passing) {
     if (!passing && !passing_[body]) return;
     passing_[body] = std::move(passing);
+    const ColliderId id = ColliderId::body(body);
+    std::erase_if(pairs_, [&](const ContactPair& pair) { return pair.points == id && pair.touched == id; });
+    reach_ = -1;
+}
+
+void Contacts::set_own_gap(std::size_t body, float gap) {
+    if (own_gaps_[body] == gap) return;
+    own_gaps_[body] = gap;
     const ColliderId id = ColliderId::body(body);
     std::erase_if(pairs_, [&](const ContactPair& pair) { return pair.points == id && pair.touched == id; });
     reach_ = -1;
@@ -118,7 +128,10 @@ ContactPair Contacts::make_pair(ColliderId points, ColliderId touched, std::span
     if (pair.is_of_bodies()) {
         pair.law = laws_.of(bodies[points.number()].actor, bodies[touched.number()].actor);
         pair.stiffness = matter_[points.number()]->matter ? 0.5f : 1.0f; // half where the other's points push as well
-        if (pair.is_own()) pair.stiffness *= kWithinOneBody;
+        if (pair.is_own()) {
+            pair.stiffness *= kWithinOneBody;
+            pair.slack = -own_gaps_[points.number()];
+        }
         return pair;
     }
     const Obstacle& obstacle = world_.obstacles[pair.obstacle()];
@@ -229,7 +242,7 @@ void Contacts::note_touch(const ContactPair& pair, const Candidate& at, ContactR
         const auto touch = std::uint8_t((pair.is_own() ? kInItself : kInMatter) | rubs);
         touched_[pair.points.number()] |= touch;
         touched_[pair.touched.number()] |= touch;
-        report.deepest_in_matter = std::max(report.deepest_in_matter, at.depth);
+        report.deepest_in_matter = std::max(report.deepest_in_matter, at.depth + std::min(pair.slack, 0.0f));
         return;
     }
     touched_[pair.body()] |= std::uint8_t((pair.is_of_edges() ? kInMatter : kOnObstacle) | rubs);

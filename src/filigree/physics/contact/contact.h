@@ -42,6 +42,8 @@ public:
     void set_obstacle(std::size_t obstacle, bool is_jump);
     /// Between which limbs of a body there is no contact; null: everything touches.
     void set_passing(std::size_t body, std::shared_ptr<const OwnCells::Passing> passing);
+    /// m: from how far on a body's parts push each other.
+    void set_own_gap(std::size_t body, float gap);
     /// Calls visit(other) for bodies that touch a body, or may soon.
     template <class Visit>
     void each_beside(std::size_t body, const Visit& visit) const {
@@ -226,6 +228,7 @@ private:
     std::vector<std::shared_ptr<const BodyMatter>> matter_;         ///< of each body
     std::vector<std::shared_ptr<const OwnCells>> own_cells_;        ///< null: of bodies that do not meet themselves
     std::vector<std::shared_ptr<const OwnCells::Passing>> passing_; ///< of bodies; null: everything touches
+    std::vector<float> own_gaps_;                                   ///< of bodies, m
     std::vector<std::uint8_t> recovers_;                            ///< of each body: 1 while it does not meet itself
     MotionBounds motions_;
     CrushedParticles crushed_;

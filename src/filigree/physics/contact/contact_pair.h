@@ -44,7 +44,7 @@ struct ContactPair {
     PairContact law;
     float spacing = 0;       ///< m, the smaller of both
     float stiffness = 1;     ///< of the contact, as a part of what the surfaces have
-    float slack = 0;         ///< m that points may lie inside and touch nothing
+    float slack = 0;         ///< m that points may lie inside and touch nothing; below 0: outside and touch
     bool is_rigid = false;   ///< nothing in it deforms: it is solved by impulses
     bool is_traced = false;  ///< points are followed beside an obstacle ...
     bool knows_side = false; ///< ... and it is known on which side of it the body began

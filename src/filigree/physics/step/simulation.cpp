@@ -95,6 +95,7 @@ void note_flow(const SimulationState& state, FrameReport& report) {
 }
 
 constexpr float kFollowingCrush = 0.02f; ///< of bodies that follow an animation: Elasticity::set_crush_share
+constexpr double kContactGap = 0.08;       ///< spacings, Follow::contact_gap where it is unset
 
 /// Substeps until the frame ends. What is not finite is held on the way, and the rest of the frame goes on from there;
 /// a state that is lost again and again stays as it is until the next frame. Returns how many particles were held.
@@ -304,6 +305,7 @@ Status Simulation::set_follow(std::size_t body, Follow follow, const Vectors& po
     if (follow.frequency.empty()) {
         release_targets(*state_, state);
         state_->contacts.set_passing(state_->slot_of[body], nullptr);
+        state_->contacts.set_own_gap(state_->slot_of[body], 0);
         if (follows) targets.erase(place);
         return Success{};
     }
@@ -323,6 +325,8 @@ Status Simulation::set_follow(std::size_t body, Follow follow, const Vectors& po
         state_->slot_of[body],
         follow.passing.empty() ? nullptr
                                : std::make_shared<const OwnCells::Passing>(*state.body, follow.groups, follow.passing));
+    state_->contacts.set_own_gap(state_->slot_of[body],
+                                 float(follow.contact_gap.value_or(kContactGap * state.body->spacing())));
     Targets made(body, std::move(follow), positions, velocities, state.body->spacing());
     state.follows = true;
     state.elasticity->set_crush_share(kFollowingCrush);

@@ -70,6 +70,8 @@ std::string check_follow(const Follow& follow, std::size_t count) {
     if (!(follow.leash_frequency >= 0 && std::isfinite(follow.leash_frequency)))
         return "follow.leash_frequency must be 0 or more, and finite.";
     if (!(follow.most_acceleration > 0)) return "follow.most_acceleration must be above 0.";
+    if (follow.contact_gap && !(*follow.contact_gap >= 0 && std::isfinite(*follow.contact_gap)))
+        return "follow.contact_gap must be 0 or more, and finite.";
     if (!follow.groups.empty() && follow.groups.size() != count)
         return "follow.groups has " + std::to_string(follow.groups.size()) + " numbers for " + std::to_string(count) +
                " particles.";
