@@ -156,10 +156,71 @@ def jump(phase):
 
 
 # %% The file
+class Glb:
+    """What a GLB is made of: accessors with their bytes, and clips."""
+
+    def __init__(self):
+        self.chunks, self.views, self.accessors, self.animations = [], [], [], []
+
+    def add(self, array, kind, component, bounds=False, target=None):
+        data = np.ascontiguousarray(array).tobytes()
+        offset = sum(map(len, self.chunks))
+        self.chunks.append(data + b"\0" * (-len(data) % 4))
+        view = {"buffer": 0, "byteOffset": offset, "byteLength": len(data)}
+        self.views.append(view | ({"target": target} if target else {}))
+        accessor = {"bufferView": len(self.views) - 1, "componentType": component, "count": len(array), "type": kind}
+        if bounds:
+            flat = np.asarray(array).reshape(len(array), -1)
+            accessor |= {"min": flat.min(0).tolist(), "max": flat.max(0).tolist()}
+        self.accessors.append(accessor)
+        return len(self.accessors) - 1
+
+    def add_clip(self, name, moments, channels):
+        """channels: of each its node, what it moves, its values and their kind."""
+        clock = self.add(moments.astype(np.float32), "SCALAR", 5126, True)
+        clip = {"name": name, "samplers": [], "channels": []}
+        for node, path, values, kind in channels:
+            values = np.array(values, np.float32)
+            clip["samplers"].append({"input": clock, "output": self.add(values, kind, 5126)})
+            clip["channels"].append({"sampler": len(clip["samplers"]) - 1, "target": {"node": node, "path": path}})
+        self.animations.append(clip)
+
+    def save(self, path, nodes, roots, mesh, skin_color, more=None):
+        look = {"baseColorFactor": [*skin_color, 1], "metallicFactor": 0, "roughnessFactor": 0.6}
+        binary = b"".join(self.chunks)
+        document = {
+            "asset": {"version": "2.0", "generator": "Filigree's examples"},
+            "scene": 0,
+            "scenes": [{"nodes": roots}],
+            "nodes": nodes,
+            "meshes": [mesh],
+            "materials": [{"name": "Skin", "pbrMetallicRoughness": look}],
+            "animations": self.animations,
+            "bufferViews": self.views,
+            "accessors": self.accessors,
+            "buffers": [{"byteLength": len(binary)}],
+        } | (more or {})
+        text = json.dumps(document).encode()
+        text += b" " * (-len(text) % 4)
+        with open(path, "wb") as file:
+            file.write(struct.pack("<III", 0x46546C67, 2, 12 + 8 + len(text) + 8 + len(binary)))
+            file.write(struct.pack("<II", len(text), 0x4E4F534A) + text)
+            file.write(struct.pack("<II", len(binary), 0x004E4942) + binary)
+
+
+def add_surface(file, places, quads, colors, attributes):
+    """The primitive of a mesh. colors: of the vertices, linear, three or four numbers each, or None."""
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    attributes = {"POSITION": file.add(places.astype(np.float32), "VEC3", 5126, True, 34962)} | attributes
+    if colors is not None:
+        attributes["COLOR_0"] = file.add(colors.astype(np.float32), f"VEC{colors.shape[1]}", 5126, target=34962)
+    indices = file.add(triangles.astype(np.uint32).reshape(-1), "SCALAR", 5125, target=34963)
+    return {"attributes": attributes, "indices": indices, "material": 0}
+
+
 def write_character(path, name, places, quads, clips, skin_color, colors=None):
     """clips: of each its name, a function of the phase that gives rotations by joint and the shift of the first joint,
     its seconds and its number of keys. colors: of the vertices, linear, (n, 3)."""
-    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     distance = joint_distances(places)
     weight = np.exp(-np.maximum(distance - distance.min(1, keepdims=True), 0) / 0.02)
     best = np.argsort(-weight, axis=1)[:, :4]
@@ -167,21 +228,6 @@ def write_character(path, name, places, quads, clips, skin_color, colors=None):
     of_best[of_best < 0.02] = 0
     of_best /= of_best.sum(1, keepdims=True)
     best[of_best == 0] = 0
-
-    chunks, views, accessors = [], [], []
-
-    def add(array, kind, component, bounds=False, target=None):
-        data = np.ascontiguousarray(array).tobytes()
-        offset = sum(map(len, chunks))
-        chunks.append(data + b"\0" * (-len(data) % 4))
-        view = {"buffer": 0, "byteOffset": offset, "byteLength": len(data)}
-        views.append(view | ({"target": target} if target else {}))
-        accessor = {"bufferView": len(views) - 1, "componentType": component, "count": len(array), "type": kind}
-        if bounds:
-            flat = np.asarray(array).reshape(len(array), -1)
-            accessor |= {"min": flat.min(0).tolist(), "max": flat.max(0).tolist()}
-        accessors.append(accessor)
-        return len(accessors) - 1
 
     where = {joint[0]: np.array(joint[2], float) for joint in JOINTS}
     nodes = [{"name": name, "mesh": 0, "skin": 0}]
@@ -195,54 +241,20 @@ def write_character(path, name, places, quads, clips, skin_color, colors=None):
     for number, joint in enumerate(NAMES):
         binds[number, 3, :3] = -where[joint]  # columns first
 
-    animations = []
+    file = Glb()
     for clip, pose_at, seconds, keys in clips:
         moments = np.linspace(0, 1, keys)
         poses = [pose_at(phase) for phase in moments]
-        clock = add((seconds * moments).astype(np.float32), "SCALAR", 5126, True)
-        samplers, channels = [], []
-
-        def channel(joint, path, values, kind):
-            samplers.append({"input": clock, "output": add(np.array(values, np.float32), kind, 5126)})
-            target = {"node": first + NAMES.index(joint), "path": path}
-            channels.append({"sampler": len(samplers) - 1, "target": target})
-
-        for joint in NAMES:
-            values = [pose.get(joint, rotation(X, 0)) for pose, _ in poses]
-            channel(joint, "rotation", values, "VEC4")
-        channel(NAMES[0], "translation", [where[NAMES[0]] + shift for _, shift in poses], "VEC3")
-        animations.append({"name": clip, "samplers": samplers, "channels": channels})
-
-    attributes = {
-        "POSITION": add(places.astype(np.float32), "VEC3", 5126, True, 34962),
-        "JOINTS_0": add(best.astype(np.uint8), "VEC4", 5121, target=34962),
-        "WEIGHTS_0": add(of_best.astype(np.float32), "VEC4", 5126, target=34962),
-    }
-    if colors is not None:
-        attributes["COLOR_0"] = add(colors.astype(np.float32), "VEC3", 5126, target=34962)
-    indices = add(triangles.astype(np.uint32).reshape(-1), "SCALAR", 5125, target=34963)
-    look = {"baseColorFactor": [*skin_color, 1], "metallicFactor": 0, "roughnessFactor": 0.6}
-    joints = list(range(first, first + len(JOINTS)))
-    document = {
-        "asset": {"version": "2.0", "generator": "Filigree's examples"},
-        "scene": 0,
-        "scenes": [{"nodes": [0, first]}],
-        "nodes": nodes,
-        "meshes": [{"name": name, "primitives": [{"attributes": attributes, "indices": indices, "material": 0}]}],
-        "materials": [{"name": "Skin", "pbrMetallicRoughness": look}],
-        "skins": [{"joints": joints, "skeleton": first, "inverseBindMatrices": add(binds, "MAT4", 5126)}],
-        "animations": animations,
-        "bufferViews": views,
-        "accessors": accessors,
-    }
-    binary = b"".join(chunks)
-    document["buffers"] = [{"byteLength": len(binary)}]
-    text = json.dumps(document).encode()
-    text += b" " * (-len(text) % 4)
-    with open(path, "wb") as file:
-        file.write(struct.pack("<III", 0x46546C67, 2, 12 + 8 + len(text) + 8 + len(binary)))
-        file.write(struct.pack("<II", len(text), 0x4E4F534A) + text)
-        file.write(struct.pack("<II", len(binary), 0x004E4942) + binary)
+        channels = [(first + number, "rotation", [pose.get(joint, rotation(X, 0)) for pose, _ in poses], "VEC4")
+                    for number, joint in enumerate(NAMES)]
+        channels.append((first, "translation", [where[NAMES[0]] + shift for _, shift in poses], "VEC3"))
+        file.add_clip(clip, seconds * moments, channels)
+    surface = add_surface(file, places, quads, colors,
+                          {"JOINTS_0": file.add(best.astype(np.uint8), "VEC4", 5121, target=34962),
+                           "WEIGHTS_0": file.add(of_best.astype(np.float32), "VEC4", 5126, target=34962)})
+    skin = {"joints": list(range(first, first + len(JOINTS))), "skeleton": first,
+            "inverseBindMatrices": file.add(binds, "MAT4", 5126)}
+    file.save(path, nodes, [0, first], {"name": name, "primitives": [surface]}, skin_color, {"skins": [skin]})
     names = " and ".join(clip[0] for clip in clips)
     print(f"{path}: {len(places):,} vertices, {len(JOINTS)} joints, clips {names}")
 
