@@ -38,6 +38,7 @@ struct FleshArguments {
     std::string soft_from;
     std::vector<double> soft_values;
     std::optional<double> input_rate;
+    std::size_t patches = CharacterOptions{}.patches;
     bool by_surface = false, keep_skeleton = false;
     double strength = SoftJoints{}.strength;
     FleshOptions flesh;
@@ -191,6 +192,7 @@ private:
         CharacterOptions character;
         character.by_joints = !options_.by_surface;
         character.frames_per_second = options_.input_rate;
+        character.patches = options_.patches;
         Mesh rest;
         if (!options_.mesh.empty()) {
             rest = session_.read_mesh(options_.mesh);
@@ -444,6 +446,11 @@ Command flesh_command() {
                 Option("--mesh", options->mesh, "The mesh at rest, for an input that has positions alone").is_read(),
                 Option("--by-surface", options->by_surface,
                        "Follow the surface of a skin, with its morph targets, and not its joints"),
+                Option("--patches", options->patches,
+                       "Of a surface without joints: so many patches move its matter; what it does beside them, such as "
+                       "a blink, lies on top")
+                    .whole_from(12)
+                    .with_default(),
                 Option("--input-rate", options->input_rate,
                        "Frames a second of an input that does not say it (default: 60)")
                     .above_zero(),
@@ -481,6 +488,11 @@ Command flesh_command() {
                 Option("--joints", options->joints, "Joints of the output, about").whole_from(12).with_default(),
                 Option("--stiffness", options->flesh.material.young_modulus, "Young's modulus of the flesh, Pa")
                     .above_zero()
+                    .with_default(),
+                Option("--poisson-ratio", options->flesh.material.poisson_ratio,
+                       "How well the flesh keeps its volume while it is pressed: 0.49 does so best and takes twice as "
+                       "long")
+                    .between(0.0, 0.49)
                     .with_default(),
                 Option("--density", options->flesh.material.density, "Density of the flesh, kg/m^3")
                     .above_zero()

@@ -255,6 +255,40 @@ TEST(Flesh, ASurfaceWithoutJointsIsFollowedToo) {
     EXPECT_NE(skin_of_surface(std::move(lost), 100).error().message.find("not finite"), std::string::npos);
 }
 
+/// A blink is finer than the particles: it lies on top of them, and turns with them.
+TEST(Flesh, WhatASurfaceDoesBetweenParticlesLiesOnTop) {
+    const Mesh rest = tube(kCoarse, 1, waving(0, 1)).mesh;
+    const auto is_lid = [&](Index v) { return rest.positions[v].x() > 0.2f && rest.positions[v].x() < 0.3f; };
+    const auto root = [](double t) { return Eigen::AngleAxisd(2 * t, Vec3d::UnitZ()).toRotationMatrix(); };
+    MovingSurface surface{.rest = rest, .clips = {{"blinks", 0.5}}, .positions = {}};
+    surface.positions = [=](std::size_t, double t, std::span<Vec3f> out) -> Status {
+        for (Index v = 0; v < out.size(); ++v) {
+            Vec3d p = rest.positions[v].cast<double>();
+            if (is_lid(v)) p.x() += 0.1 * t;
+            out[v] = (root(t) * p).cast<float>();
+        }
+        return Success{};
+    };
+    const Flesh flesh = Flesh::create(skin_of_surface(std::move(surface), 12).value(), kSmall).value();
+    const FleshClip clip = simulate_flesh(flesh, 0, kThirty).value();
+    std::vector<Index> all(rest.vertex_count());
+    std::iota(all.begin(), all.end(), Index{0});
+    FleshCarrier carrier = FleshCarrier::create(flesh, all).value();
+    std::vector<Vec3f> first(all.size()), last(all.size());
+    carrier.at(clip, 0, first, {});
+    carrier.at(clip, clip.frames.size() - 1, last, {});
+    double along = 0, count = 0;
+    for (const Index v : all) {
+        EXPECT_LT((first[v] - rest.positions[v]).norm(), 1e-4f);
+        if (!is_lid(v)) continue;
+        const Vec3d back = root(0.5).transpose() * last[v].cast<double>() - rest.positions[v].cast<double>();
+        along += back.x();
+        ++count;
+    }
+    ASSERT_GT(count, 8);
+    EXPECT_NEAR(along / count, 0.05, 0.015);
+}
+
 /// Cells that the skin turns inside out at the start would fly apart.
 TEST(Flesh, AFoldedStartIsSettled) {
     const auto folded = [](double) { return std::pair(radians(150), 0.0); };

@@ -1,4 +1,5 @@
 // A clip of a skin, simulated as flesh.
+#include "filigree/core/dense_solve.h"
 #include "filigree/core/now_seconds.h"
 #include "filigree/core/parallel_for.h"
 #include "filigree/flesh.h"
@@ -16,6 +17,9 @@ constexpr double kFadeFrom = 0.75;        ///< of the cycle
 constexpr double kFarthestTravel = 2000;  ///< m, in a clip: 32-bit floats are too coarse beyond half of it
 constexpr float kSamePlace = 1e-4f;       ///< spacings: where a loop begins again
 constexpr double kLongestStep = 1.0 / 24; ///< s: a clip of two frames is no cycle
+constexpr std::size_t kDetailGrain = 512; // vertices
+constexpr double kSmallDetail = 1e-4;     ///< spacings
+constexpr double kFlat = 0.05;            ///< of a volume: what no turn is told from
 
 Error misused(std::string sentence) { return {ErrorCode::usage, std::move(sentence)}; }
 
@@ -273,7 +277,43 @@ struct FleshCarrier::Content {
     std::vector<Vec3f> points;
     std::vector<Mat3f> gradients;
     std::vector<Eigen::Affine3d> transforms;
+
+    double seconds(const FleshClip& clip, std::size_t frame) const {
+        const bool closes = clip.is_loop && frame + 1 == clip.frames.size();
+        const double at = double(closes ? 0 : frame) / clip.frames_per_second;
+        return std::min(at, flesh.skin().clips[clip.clip].seconds);
+    }
+    void add_detail(const FleshClip& clip, std::size_t frame, const RunContext& context);
 };
+
+/// What a surface without joints does between particles, such as a blink: the way from where the particles would carry
+/// a vertex, were they all on their targets, to where the surface has it. It turns with the matter.
+void FleshCarrier::Content::add_detail(const FleshClip& clip, std::size_t frame, const RunContext& context) {
+    const SkinnedMesh& skin = flesh.skin();
+    std::vector<Vec3f> surface(skin.mesh.vertex_count()), on_targets(points.size());
+    std::vector<Mat3f> gradients_there(points.size()), gradients_here(points.size());
+    if (!clip_positions(skin, clip.clip, seconds(clip, frame), surface, context)) return; // it was read before
+    Vectors targets;
+    skin.transforms(clip.clip, seconds(clip, frame), transforms);
+    flesh.targets(transforms, clip.offset, targets, nullptr, context);
+    simulation.attached(0, points, gradients_here, context);
+    if (!simulation.set_positions(0, targets)) return;
+    simulation.attached(0, on_targets, gradients_there, context);
+    const double scale = flesh.scale();
+    const auto least = float(kSmallDetail * flesh.body()->spacing());
+    parallel_for(context, points.size(), kDetailGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            const Vec3d wanted = scale * surface[vertices[carried[k]]].cast<double>() - clip.offset;
+            const Vec3f detail = wanted.cast<float>() - on_targets[k];
+            if (!(detail.norm() > least)) continue;
+            const Mat3d there = gradients_there[k].cast<double>();
+            const bool turns = std::abs(there.determinant()) > kFlat;
+            const Mat3d turn = turns ? nearest_rotation(gradients_here[k].cast<double>() * there.inverse())
+                                     : Mat3d(Mat3d::Identity());
+            points[k] += turn.cast<float>() * detail;
+        }
+    });
+}
 
 FleshCarrier::FleshCarrier(std::unique_ptr<Content> content) : content_(std::move(content)) {}
 FleshCarrier::FleshCarrier(FleshCarrier&&) noexcept = default;
@@ -312,6 +352,7 @@ void FleshCarrier::at(const FleshClip& clip, std::size_t frame, std::span<Vec3f>
     const SkinnedMesh& skin = c.flesh.skin();
     if (c.simulation.set_positions(0, clip.frames[frame]))
         c.simulation.attached(0, c.points, gradients.empty() ? std::span<Mat3f>() : std::span(c.gradients), context);
+    if (skin.surface) c.add_detail(clip, frame, context);
     const double scale = c.flesh.scale();
     for (std::size_t k = 0; k < c.carried.size(); ++k) {
         positions[c.carried[k]] = ((c.points[k].cast<double>() + clip.offset) / scale).cast<float>();
