@@ -217,6 +217,14 @@ TEST(Fit, BadAnimationsGetOneSentence) {
         5, [](std::span<Vec3f> positions) { std::shuffle(positions.begin(), positions.end(), std::mt19937(1)); });
     const std::string order = sentence(shuffled, {}, ErrorCode::unsuitable);
     EXPECT_TRUE(order.starts_with("Frame 6: half of its edges")) << order;
+    MadeAnimation coarse = flag(18, 12, 6);
+    coarse.animation.positions = [draw = coarse.animation.positions](std::size_t frame, std::span<Vec3f> positions) {
+        const Status done = draw(frame, positions);
+        if (frame == 4) std::shuffle(positions.begin(), positions.end(), std::mt19937(1));
+        return done;
+    };
+    const std::string of_coarse = sentence(coarse.animation, {}, ErrorCode::unsuitable);
+    EXPECT_TRUE(of_coarse.starts_with("Frame 5: half of its edges")) << of_coarse;
     MeshAnimation empty = made.animation;
     empty.frames = 0;
     EXPECT_EQ(sentence(empty, {}, ErrorCode::unsuitable), "The animation has no frames: there is nothing to fit.");

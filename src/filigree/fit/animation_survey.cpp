@@ -19,7 +19,9 @@ constexpr std::size_t kSurveyGrain = 16384;
 constexpr std::size_t kMostPoints = 4000, kFewestPoints = 200; // that frames are compared by
 constexpr std::size_t kMostKept = std::size_t{16} << 20;       // bytes of them, over all frames
 constexpr std::size_t kMostEdges = 20'000;
-constexpr double kOtherOrder = 20;     // times as long as at rest is half of the edges where the order changed
+// Half of the edges are so many times as long as at rest where the order changed: 20, or less in a coarse mesh, in which
+// even an edge from anywhere to anywhere, nearly half as long as the shape is large, is not so much longer.
+constexpr double kOtherOrder = 20, kLeastOtherOrder = 4, kAnywhere = 0.4;
 constexpr double kTogether = 2e-6;     // of the diagonal: vertices that stay so near are one
 constexpr double kSameFrame = 1e-6;    // of the diagonal: a frame this near to one chosen tells nothing new
 constexpr std::size_t kMostRests = 32; // frames that may become the rest
@@ -80,6 +82,11 @@ public:
     OrderCheck(const Mesh& mesh, std::span<const Vec3f> rest, std::span<const Index> points)
         : edges_(some_edges(mesh, rest)), points_(points), size_(size(rest)) {
         for (const Edge& edge : edges_) lengths_.push_back(length(edge, rest));
+        if (edges_.empty()) return;
+        std::vector<double> sorted = lengths_;
+        const auto middle = sorted.begin() + std::ptrdiff_t(sorted.size() / 2);
+        std::ranges::nth_element(sorted, middle);
+        most_ = std::clamp(kAnywhere * size_ / *middle, kLeastOtherOrder, kOtherOrder);
     }
 
     Status check(std::span<const Vec3f> positions, std::size_t frame) const {
@@ -89,9 +96,9 @@ public:
         for (std::size_t e = 0; e < edges_.size(); ++e) stretches.push_back(length(edges_[e], positions) / lengths_[e]);
         const auto middle = stretches.begin() + std::ptrdiff_t(stretches.size() / 2);
         std::ranges::nth_element(stretches, middle);
-        if (*middle * size_ / now <= kOtherOrder) return Success{};
+        if (*middle * size_ / now <= most_) return Success{};
         return Error{ErrorCode::unsuitable,
-                     frame_name(frame) + ": half of its edges are more than " + std::to_string(int(kOtherOrder)) +
+                     frame_name(frame) + ": half of its edges are more than " + std::to_string(int(most_)) +
                          " times as long as at rest, so its vertices are in another order than the mesh's; export the "
                          "animation and the mesh from the same object, with the order of vertices kept."};
     }
@@ -111,6 +118,7 @@ private:
     std::span<const Index> points_;
     std::vector<double> lengths_;
     double size_;
+    double most_ = kOtherOrder;
 };
 
 /// Vertices at one place at rest, and which of them have stayed together so far.
