@@ -78,7 +78,7 @@ if(FILIGREE_NODE AND bundler)
     file(GLOB runtime_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/runtime/*.[ch] ${web}/filigree/*)
     add_custom_command(
       OUTPUT ${live}/live.wasm ${live}/live.wasm.gz
-      COMMAND ${PROJECT_SOURCE_DIR}/scripts/wasm ${live}/live.wasm
+      COMMAND ${PROJECT_SOURCE_DIR}/scripts/wasm live ${live}/live.wasm
       DEPENDS ${live_sources} ${PROJECT_SOURCE_DIR}/scripts/wasm
       COMMENT "Compiling the physics of live pages" VERBATIM)
     add_custom_command(

@@ -107,7 +107,7 @@ enum class InsideMethod { automatic, scan, rays, winding };
 enum class Overlap { parity, merged };
 
 /// Most memory for decisions about a lattice, unless InsideOptions says otherwise.
-inline constexpr std::size_t kMostLatticeBytes = std::size_t{4} << 30;
+inline constexpr std::size_t kMostLatticeBytes = std::size_t{1} << (sizeof(std::size_t) > 4 ? 32 : 29);
 
 struct InsideOptions {
     InsideMethod method = InsideMethod::automatic;

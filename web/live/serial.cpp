@@ -1,7 +1,11 @@
 // What stands in for the system in the page's worker: one thread, and no exceptions.
+#include "web/live/serial.h"
+
 #include "filigree/core/thread_pool.h"
 
+#include <cstdlib>
 #include <ctime>
+#include <string>
 #include <typeinfo>
 
 namespace filigree {
@@ -11,11 +15,21 @@ void run_on_pool(std::size_t pieces, unsigned, std::atomic<unsigned>&, const Loo
 
 } // namespace filigree
 
-// Only a result's value that nobody checked, and memory that has run out, are thrown. Here both stop the program, and
-// the worker says that it was stopped. So nothing of it has to be unwound.
+// What is thrown ends the program, as nothing unwinds; memory that has run out does too. Only its sentence is left.
+namespace {
+std::string sentence;
+}
 extern "C" {
-void* __cxa_allocate_exception(std::size_t) throw() { __builtin_trap(); }
-[[noreturn]] void __cxa_throw(void*, std::type_info*, void (*)(void*)) { __builtin_trap(); }
+__attribute__((export_name("thrown"))) const char* thrown() { return sentence.c_str(); }
+void* __cxa_allocate_exception(std::size_t size) throw() { return std::malloc(size); }
+[[noreturn]] void __cxa_throw(void* what, std::type_info* type, void (*)(void*)) {
+    const std::string_view name = type->name();
+    if (name == "N8filigree15BadResultAccessE")
+        sentence = static_cast<const filigree::BadResultAccess*>(what)->what();
+    else
+        sentence = filigree::sentence_of(what, name);
+    __builtin_trap();
+}
 int clock_gettime(clockid_t, timespec* now) { // reports say how long a frame took: the page measures that itself
     *now = {};
     return 0;

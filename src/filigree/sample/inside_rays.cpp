@@ -129,7 +129,7 @@ FILIGREE_INLINE unsigned children_met(const RayNode& node, const Ray& ray) {
         enter = to_near > enter ? to_near : enter;
         leave = to_far < leave ? to_far : leave;
     }
-    return lane_bits<Avx2>(enter <= leave);
+    return lane_bits<Avx2>(Int8(enter <= leave));
 }
 
 bool crosses_exactly(const RayLeaf& leaf, int triangle, const Vec3d& eye, const Vec3d& point, exact::Tally& tally) {

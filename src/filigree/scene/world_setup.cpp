@@ -70,7 +70,8 @@ Box body_box(const ReadyBody& body) { return bounds(body.model.mesh); }
 
 class Builder {
 public:
-    Builder(const SceneFile& scene, const RunContext& context) : scene_(scene), context_(context) {}
+    Builder(const SceneFile& scene, const RunContext& context, KnownMeshes known)
+        : scene_(scene), context_(context), known_(std::move(known)) {}
 
     ReadyScene build() {
         hash_.add(scene_.content);
@@ -115,6 +116,11 @@ private:
         Model model;
         if (body.mesh.empty()) {
             model.mesh = make_shape(body.shape, body.shape_options).value();
+            return model;
+        }
+        if (const auto known = known_.find(body.mesh); known != known_.end()) {
+            model.mesh = std::move(known->second);
+            known_.erase(known); // bodies alike are made once
             return model;
         }
         const std::string bytes = read_file(path_of(body.mesh)).value();
@@ -504,6 +510,7 @@ private:
 
     const SceneFile& scene_;
     const RunContext& context_;
+    KnownMeshes known_;
     ReadyScene result_;
     Hash hash_;
 };
@@ -524,9 +531,9 @@ void leave_out_closed_cracks(ReadyBody& body, std::span<const Pose> poses) {
     std::erase_if(body.pieces.crack_of_face, [&](Index crack) { return crack != kNoIndex && !is_open[crack]; });
 }
 
-Result<ReadyScene> set_up(const SceneFile& scene, const RunContext& context) {
+Result<ReadyScene> set_up(const SceneFile& scene, const RunContext& context, KnownMeshes known) {
     try {
-        return Builder(scene, context).build();
+        return Builder(scene, context, std::move(known)).build();
     } catch (const BadResultAccess& failure) {
         return failure.error();
     }

@@ -5,6 +5,9 @@
 #include "filigree/scene/body_driver.h"
 #include "filigree/scene/breaking.h"
 
+#include <map>
+#include <string>
+
 namespace filigree {
 
 /// An error in a line of the scene: "scene.toml:12: what".
@@ -59,8 +62,11 @@ struct ReadyScene {
 /// them, or does not break.
 void leave_out_closed_cracks(ReadyBody& body, std::span<const Pose> poses);
 
+using KnownMeshes = std::map<std::string, Mesh>;
+
 /// Reads the scene's meshes, strips them and fills them with particles. Errors name the scene's line: those of the
 /// readers, of strip, make_body and DistanceField; bad_file (a region without particles, a vertex that is not there).
-Result<ReadyScene> set_up(const SceneFile& scene, const RunContext& context);
+/// known: meshes that were read already, by the names that the scene gives them.
+Result<ReadyScene> set_up(const SceneFile& scene, const RunContext& context, KnownMeshes known = {});
 
 } // namespace filigree
