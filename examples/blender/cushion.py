@@ -20,8 +20,10 @@ def read(path):
     """A mesh file as an object a metre large, tilted, above the ground."""
     if path.lower().endswith(".obj"):
         bpy.ops.wm.obj_import(filepath=path)
-    else:
+    elif bpy.app.version < (4, 0):
         bpy.ops.import_mesh.ply(filepath=path)
+    else:
+        bpy.ops.wm.ply_import(filepath=path)
     high = bpy.context.object
     high.data.transform(Euler((0, TILT, 0)).to_matrix().to_4x4() @ high.matrix_world)
     high.matrix_world = Matrix()
