@@ -94,7 +94,8 @@ void check(const DeformArguments& options, const Session& session) {
 
 /// A model's poses are all in memory until they are written.
 void check_poses_fit(std::size_t frames, std::size_t driver_vertices, const std::string& output) {
-    constexpr std::size_t kVertexBytes = sizeof(Vec3f) + sizeof(Mat3f), kMost = std::size_t{4} << 30;
+    constexpr std::size_t kVertexBytes = sizeof(Vec3f) + sizeof(Mat3f);
+    constexpr std::uint64_t kMost = std::uint64_t{4} << 30;
     const double bytes = double(frames) * double(driver_vertices * kVertexBytes);
     if (bytes > double(kMost))
         refuse(fmt::format("{}: {} poses of {} vertices are {:.3g} GB, and a model's poses may be {:.3g}; ask "

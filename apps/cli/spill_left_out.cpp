@@ -1,4 +1,4 @@
-// Windows: arrays stay in memory, and the system's page file takes what does not fit.
+// Windows and WASM: arrays stay in memory, and the system's page file takes what does not fit.
 #include "spill.h"
 
 namespace filigree::cli {

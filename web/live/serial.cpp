@@ -1,19 +1,10 @@
-// What stands in for the system in the page's worker: one thread, and no exceptions.
+// What stands in for the system in the page's worker: no clock and no exceptions.
 #include "web/live/serial.h"
-
-#include "filigree/core/thread_pool.h"
 
 #include <cstdlib>
 #include <ctime>
 #include <string>
 #include <typeinfo>
-
-namespace filigree {
-
-unsigned processors() { return 1; }
-void run_on_pool(std::size_t pieces, unsigned, std::atomic<unsigned>&, const LoopBody& body) { body(0, pieces); }
-
-} // namespace filigree
 
 // What is thrown ends the program, as nothing unwinds; memory that has run out does too. Only its sentence is left.
 namespace {

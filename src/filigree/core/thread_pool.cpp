@@ -3,6 +3,17 @@
 // deadlock.
 #include "filigree/core/thread_pool.h"
 
+#if defined(__wasi__) // one thread
+
+namespace filigree {
+
+unsigned processors() { return 1; }
+void run_on_pool(std::size_t pieces, unsigned, std::atomic<unsigned>&, const LoopBody& body) { body(0, pieces); }
+
+} // namespace filigree
+
+#else
+
 #include <algorithm>
 #include <condition_variable>
 #include <cstddef>
@@ -196,3 +207,5 @@ void run_on_pool(std::size_t pieces, unsigned threads, std::atomic<unsigned>& he
 }
 
 } // namespace filigree
+
+#endif

@@ -46,7 +46,7 @@ public:
         parts_ = *std::move(parts);
         const std::size_t a_frame =
             parts_.vertex_count() * (options_.morph_normals ? 24 : 12) + 4 * animation_.frames; // offsets and weights
-        if (a_frame > (std::size_t{1} << 32) / animation_.frames)
+        if (a_frame > (std::uint64_t{1} << 32) / animation_.frames)
             return Error{ErrorCode::unsupported,
                          path.string() + ": " + std::to_string(animation_.frames) + " morph targets of " +
                              std::to_string(parts_.vertex_count()) +
