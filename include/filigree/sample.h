@@ -107,7 +107,7 @@ enum class InsideMethod { automatic, scan, rays, winding };
 /// Where closed parts overlap: parity makes the overlap outside, merged makes it inside.
 enum class Overlap { parity, merged };
 
-/// Most memory for decisions about a lattice, unless InsideOptions says otherwise: 4 GiB, or 512 MiB where sizes have 32 bits.
+/// Most memory for decisions about a lattice, unless InsideOptions says otherwise: 4 GiB, 512 MiB on 32 bits.
 inline constexpr std::size_t kMostLatticeBytes = std::size_t{1} << (sizeof(std::size_t) > 4 ? 32 : 29);
 
 struct InsideOptions {

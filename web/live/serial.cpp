@@ -1,6 +1,8 @@
 // What stands in for the system in the page's worker: no clock and no exceptions.
 #include "web/live/serial.h"
 
+#include <filigree/result.h>
+
 #include <cstdlib>
 #include <ctime>
 #include <string>
