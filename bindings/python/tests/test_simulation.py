@@ -297,7 +297,7 @@ def said_by(work):
 
 
 def test_a_mode_of_older_versions_is_taken_with_a_warning():
-    body = filigree.Body(BAR, "jelly", particles=100)
+    body = filigree.Body(BAR, "jelly", particles=100, size=0.2)
     with pytest.warns(filigree.FiligreeWarning, match="mode 'descent' is a word of older versions"):
         old = filigree.Simulation([body], mode="descent")
     new = filigree.Simulation([body], mode="auto")
