@@ -19,7 +19,7 @@ import python_reference
 PARTS = {
     "Tutorials": ["tutorials/README"],
     "First steps": ["command-line", "python", "blender", "studio", "gallery"],
-    "Guides": ["blend-code", "fitting", "flesh", "packing", "handles", "bodies", "bodies-theory", "scenes", "fracture", "melting", "remesh", "inside-points", "rendering", "exchange", "cluster", "web", "live", "runtime"],
+    "Guides": ["blend-code", "fitting", "flesh", "packing", "handles", "bodies", "bodies-theory", "scenes", "fracture", "melting", "remesh", "inside-points", "rendering", "exchange", "cluster", "web", "live", "site", "runtime"],
     "File formats": ["formats", "animations", "fil-format"],
     "How it works": ["reference-code", "figures", "benchmarks", "reliability", "conventions", "platforms", "architecture", "decisions/README", "contributing", "dependencies", "releasing"],
 }

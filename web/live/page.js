@@ -8,6 +8,7 @@ import { TiltedGravity } from './tilt.js';
 export const element = (id) => document.getElementById(id);
 const kSlow = 1 / 8;        // of the speed, in slow motion
 const kMostFrames = 4;      // of the simulation between two pictures; what is later is left out, so time slows
+const kHeader = 62, kActions = 70; // pixels above and below the picture
 const kRateSeconds = 1;     // over which the rate is measured
 const kFollowed = 0.5;      // of the picture's radius: bodies that are further from its middle take the view along
 
@@ -24,7 +25,7 @@ export class Page {
     this.rates = [];          // [{ real, simulated }] of the last second
     this.end = new AbortController(); // of what listens
     live.place(opened.drivers, opened.poses);
-    this.stage = new Stage(element('picture'), { scene: live.scene, box: live.room() }, () => {});
+    this.stage = new Stage(element('picture'), stage_of(live), () => {});
     this.stage.floor.visible = live.floor !== null;
     if (live.floor !== null) this.stage.floor.position.y = live.floor;
     this.tilt = new TiltedGravity(new THREE.Vector3(...file.head.gravity), this.stage.camera, live);
@@ -200,7 +201,7 @@ export class Page {
     document.documentElement.dataset.theme = dark ? 'dark' : 'light';
     this.stage.set_dark(dark);
   }
-  resize() { this.stage.resize(innerWidth, innerHeight, 0, 70); }
+  resize() { this.stage.resize(innerWidth, innerHeight, 0, kActions, kHeader); }
 
   listen() {
     const { signal } = this.end, picture = element('picture');
@@ -250,6 +251,14 @@ export class Page {
     this.stage.renderer.forceContextLoss();
     element('picture').replaceWith(element('picture').cloneNode());
   }
+}
+
+/// What the stage shows: the room of the bodies, all of it in the picture.
+function stage_of(live) {
+  const box = live.room(), reached = [];
+  for (let corner = 0; corner < 8; ++corner)
+    reached.push(...['x', 'y', 'z'].map((axis, k) => (corner >> k & 1 ? box.max : box.min)[axis]));
+  return { scene: live.scene, box, reached };
 }
 
 function median(list) { return [...list].sort((a, b) => a - b)[Math.floor(list.length / 2)]; }

@@ -121,6 +121,7 @@ export class BendPage extends Page {
   seen() {
     return this.is_bent ? [this.bent ?? this.start[0], ...this.start.slice(1)] : super.seen();
   }
+  resize() { this.stage.resize(innerWidth, innerHeight, 0, document.getElementById('bar').offsetHeight + 20, 84); }
   follow() { if (!this.is_bent) super.follow(); }
   hear(data) {
     super.hear(data);
