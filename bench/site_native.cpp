@@ -11,7 +11,9 @@ extern "C" void page_progress(const char*, unsigned, double) {}
 
 namespace {
 
-double now() { return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double now() {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 void give(const std::string& bytes) { std::copy(bytes.begin(), bytes.end(), site_take(unsigned(bytes.size()))); }
 

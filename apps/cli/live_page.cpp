@@ -35,9 +35,8 @@ void export_live_page(const SceneFile& scene, const std::string& folder_name, co
     const LiveWorld live = live_world(scene, ready);
     Simulation simulation = require(Simulation::create(live.world, live.actors, live.options, session.context()));
     const unsigned substeps = require(simulation.advance(session.silent_context())).substeps;
-    const PageFile file = require(write_page_file(scene, ready, [&](const ReadyBody& body) {
-        return with_page_materials(body.model, body.mesh_path, session);
-    }));
+    const PageFile file = require(write_page_file(
+        scene, ready, [&](const ReadyBody& body) { return with_page_materials(body.model, body.mesh_path, session); }));
     session.begin_writing(folder_name);
     require(write_file(path_of(page.model_path()), file.bytes));
     page.write(session);

@@ -29,16 +29,20 @@ export class LiveWorld {
 
   check(is_right) {
     if (is_right) return;
-    const memory = new Uint8Array(this.calls.memory.buffer), at = this.calls.text() >>> 0;
-    throw new LiveError(new TextDecoder().decode(memory.slice(at, memory.indexOf(0, at))));
+    throw new LiveError(this.text_at(this.calls.text() >>> 0));
   }
-  /// Nothing unwinds in the module: what the library throws, which is that memory has run out, ends it.
+  text_at(at) {
+    const memory = new Uint8Array(this.calls.memory.buffer);
+    return new TextDecoder().decode(memory.slice(at, memory.indexOf(0, at)));
+  }
+  /// Nothing unwinds in the module: what the library throws ends it, and leaves its sentence. What leaves none has run
+  /// out of memory.
   guarded(work) {
     try {
       return work();
     } catch (cause) {
       if (!(cause instanceof WebAssembly.RuntimeError)) throw cause;
-      throw new LiveError('The physics has run out of memory. Reload the page; bodies with fewer particles need less.');
+      throw new LiveError(this.text_at(this.calls.thrown() >>> 0) || 'The physics has run out of memory. Reload the page; bodies with fewer particles need less.');
     }
   }
 

@@ -253,11 +253,13 @@ export class Page {
   }
 }
 
-/// What the stage shows: the room of the bodies, all of it in the picture.
+/// What the stage shows: the bodies and what they fall on are in the picture, and around them is room.
 function stage_of(live) {
-  const box = live.room(), reached = [];
+  const box = live.room(), seen = live.body_box(), reached = [];
+  if (live.obstacles.some(({ is_level }) => !is_level)) seen.copy(box);
+  if (live.floor !== null) seen.expandByPoint(seen.getCenter(new THREE.Vector3()).setY(live.floor));
   for (let corner = 0; corner < 8; ++corner)
-    reached.push(...['x', 'y', 'z'].map((axis, k) => (corner >> k & 1 ? box.max : box.min)[axis]));
+    reached.push(...['x', 'y', 'z'].map((axis, k) => (corner >> k & 1 ? seen.max : seen.min)[axis]));
   return { scene: live.scene, box, reached };
 }
 

@@ -6,7 +6,7 @@ import { Page } from '../live/page.js';
 
 const kSway = 26, kSwaySeconds = 5;  // degrees, of a body that nobody has touched yet
 const kMeasured = 150;               // ms between two measurements, at least
-const kScaleOfRms = 5;               // the colours' end, in root mean squares
+const kScaleOfMean = 4;              // the colours' end, in mean errors: a few points are far off
 // From what is right to what is off.
 const kColors = [[0.13, 0.29, 0.53], [0.16, 0.55, 0.60], [0.55, 0.78, 0.44], [0.98, 0.80, 0.30], [0.88, 0.30, 0.19]];
 
@@ -74,9 +74,12 @@ export class BendPage extends Page {
     }
   }
   paint({ errors, rms }) {
-    let most = 0;
-    for (const error of errors) most = Math.max(most, error);
-    this.error = { rms, most, end: nice(Math.max(kScaleOfRms * rms, 1e-7)) };
+    let most = 0, sum = 0;
+    for (const error of errors) {
+      most = Math.max(most, error);
+      sum += error;
+    }
+    this.error = { rms, most, end: nice(Math.max(kScaleOfMean * sum / errors.length, 1e-7)) };
     const colors = this.error_color.array, { corners } = this, count = colors.length / 4;
     for (let k = 0; k < count; ++k) {
       const part = Math.min(errors[corners ? corners[k] : k] / this.error.end, 1) * (kColors.length - 1);

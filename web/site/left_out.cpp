@@ -1,4 +1,5 @@
-// What stands in for parts of the library that the standing page does not have: files, characters in motion, what melts.
+// What stands in for parts of the library that the standing page does not have: files, characters in motion, what
+// melts.
 #include "filigree/flesh.h"
 #include "filigree/flesh/skin_map.h"
 #include "filigree/io/gltf/gltf_document.h"
@@ -24,7 +25,9 @@ std::string sentence_of(const void* thrown, std::string_view type) {
 Result<std::string> read_file(const std::filesystem::path& path) {
     return Error{ErrorCode::not_found, path.string() + " lies in a file of its own, which the page does not see."};
 }
-Status write_file(const std::filesystem::path& path, std::span<const std::string_view>) { return absent(path.string()); }
+Status write_file(const std::filesystem::path& path, std::span<const std::string_view>) {
+    return absent(path.string());
+}
 
 struct FileReader::OpenFile {
     std::string_view bytes;

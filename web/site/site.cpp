@@ -21,8 +21,8 @@ using namespace filigree;
 #ifdef __wasm__
 #define EXPORTED(name) __attribute__((export_name(#name))) site_##name
 /// How far a phase is, 0 to 1.
-extern "C" __attribute__((import_module("page"), import_name("progress"))) void page_progress(const char* phase,
-                                                                                          unsigned length, double part);
+extern "C" __attribute__((import_module("page"), import_name("progress"))) void
+page_progress(const char* phase, unsigned length, double part);
 #else
 #define EXPORTED(name) site_##name
 extern "C" void page_progress(const char* phase, unsigned length, double part);
@@ -39,8 +39,8 @@ constexpr const char* kScene = "page"; // what messages call the scene, and nobo
 class TurnedBend : public SpaceWarp {
 public:
     TurnedBend(const Box& box, Axis axis, const Vec3d& direction, double degrees)
-        : centre_(box.centre()), turn_(Eigen::Quaterniond::FromTwoVectors(
-                                           Vec3d::Unit((int(axis) + 1) % 3), direction).toRotationMatrix()),
+        : centre_(box.centre()),
+          turn_(Eigen::Quaterniond::FromTwoVectors(Vec3d::Unit((int(axis) + 1) % 3), direction).toRotationMatrix()),
           bend_(make_bend(box, axis, degrees)) {}
     Vec3d position(const Vec3d& point) const override { return outside(bend_->position(inside(point))); }
     Warped warp(const Vec3d& point) const override {
@@ -64,8 +64,8 @@ struct Made {
     double diagonal = 0; ///< model units
     std::array<double, 4> bend = {};
     std::unique_ptr<SpaceWarp> warp;
-    Pose pose;                  ///< model units
-    std::vector<Vec3f> driver;  ///< m, where the body starts
+    Pose pose;                 ///< model units
+    std::vector<Vec3f> driver; ///< m, where the body starts
     std::vector<Mat3f> gradients;
     std::vector<float> errors; ///< of each vertex, fractions of the diagonal
     double rms = 0;
@@ -105,9 +105,9 @@ Status read_file_of_user(std::size_t name_length) {
     if (mesh.face_count() == 0)
         return Error{ErrorCode::unsuitable, mesh_name + " has points, and no triangles between them."};
     if (triangles > kMostTriangles)
-        return Error{ErrorCode::unsuitable,
-                     mesh_name + " has " + with_commas(triangles) + " triangles, and this page takes up to " +
-                         with_commas(kMostTriangles) + ". The program takes any number of them."};
+        return Error{ErrorCode::unsuitable, mesh_name + " has " + with_commas(triangles) +
+                                                " triangles, and this page takes up to " + with_commas(kMostTriangles) +
+                                                ". The program takes any number of them."};
     return Success{};
 }
 
@@ -155,7 +155,8 @@ std::unique_ptr<SpaceWarp> warp_of(const Box& box, const Bend& bend) {
     std::vector<std::unique_ptr<SpaceWarp>> warps;
     warps.push_back(make_squeeze(box, axis, std::clamp(bend.stretch, kLeastStretch, kMostStretch)).value());
     if (const double degrees = bend.towards.norm(); degrees > 1e-6)
-        warps.push_back(std::make_unique<TurnedBend>(box, axis, bend.towards / degrees, std::min(degrees, kMostDegrees)));
+        warps.push_back(
+            std::make_unique<TurnedBend>(box, axis, bend.towards / degrees, std::min(degrees, kMostDegrees)));
     return make_chain(std::move(warps));
 }
 

@@ -115,12 +115,12 @@ Result<std::string> drop_scene(const Mesh& mesh, const std::string& mesh_name, c
     if (material == all.end()) {
         std::vector<std::string_view> names;
         for (const NamedMaterial& named : all) names.push_back(named.name);
-        return Error{ErrorCode::usage, fmt::format("material: there is no material '{}'; there are {}.", options.material,
-                                                   fmt::join(names, ", "))};
+        return Error{ErrorCode::usage, fmt::format("material: there is no material '{}'; there are {}.",
+                                                   options.material, fmt::join(names, ", "))};
     }
     if (options.pieces.value_or(0) > 0 && material->material.model != MaterialModel::fem)
-        return Error{ErrorCode::unsuitable, fmt::format("pieces: {} does not break; glass, plaster and brittle-stone do.",
-                                                        options.material)};
+        return Error{ErrorCode::unsuitable,
+                     fmt::format("pieces: {} does not break; glass, plaster and brittle-stone do.", options.material)};
     if (!(bounds(mesh).size().maxCoeff() > 0))
         return Error{ErrorCode::unsuitable,
                      mesh_name + ": all of its points lie at one place, and a body needs a volume."};

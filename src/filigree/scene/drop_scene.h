@@ -12,11 +12,11 @@ namespace filigree {
 
 /// SI units.
 struct DropSceneOptions {
-    std::string material = "rubber"; ///< of named_materials()
-    double size = 1;                 ///< the mesh's longest side
+    std::string material = "rubber";   ///< of named_materials()
+    double size = 1;                   ///< the mesh's longest side
     std::optional<double> height = {}; ///< of its lowest point above what it falls onto; unset: half of the size
     ObstacleChoice obstacle = ObstacleChoice::none;
-    double tilt = 0;            ///< degrees, about a level axis
+    double tilt = 0;               ///< degrees, about a level axis
     std::optional<UpAxis> up = {}; ///< unset: as the mesh's flat base has it, else as in most files of its format
     std::optional<double> young_modulus = {}; ///< unset: the material's
     std::optional<std::size_t> pieces = {};   ///< unset: 40 of a material that breaks, else 0
