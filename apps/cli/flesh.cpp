@@ -446,9 +446,10 @@ Command flesh_command() {
                 Option("--mesh", options->mesh, "The mesh at rest, for an input that has positions alone").is_read(),
                 Option("--by-surface", options->by_surface,
                        "Follow the surface of a skin, with its morph targets, and not its joints"),
-                Option("--patches", options->patches,
-                       "Of a surface without joints: so many patches move its matter; what it does beside them, such as "
-                       "a blink, lies on top")
+                Option(
+                    "--patches", options->patches,
+                    "Of a surface without joints: so many patches move its matter; what it does beside them, such as "
+                    "a blink, lies on top")
                     .whole_from(12)
                     .with_default(),
                 Option("--input-rate", options->input_rate,

@@ -207,8 +207,8 @@ public:
     FleshCarrier& operator=(FleshCarrier&&) noexcept;
     ~FleshCarrier();
     /// Where the vertices are in a frame, model units relative to the mesh's origin, and the deformation gradients of
-    /// the matter there. What a surface without joints does between the particles, such as a blink, is added. gradients:
-    /// as many, or empty.
+    /// the matter there. What a surface without joints does between the particles, such as a blink, is added.
+    /// gradients: as many, or empty.
     void at(const FleshClip& clip, std::size_t frame, std::span<Vec3f> positions, std::span<Mat3f> gradients,
             const RunContext& context = RunContext());
 

@@ -19,8 +19,8 @@ constexpr std::size_t kSurveyGrain = 16384;
 constexpr std::size_t kMostPoints = 4000, kFewestPoints = 200; // that frames are compared by
 constexpr std::size_t kMostKept = std::size_t{16} << 20;       // bytes of them, over all frames
 constexpr std::size_t kMostEdges = 20'000;
-// Half of the edges are so many times as long as at rest where the order changed: 20, or less in a coarse mesh, in which
-// even an edge from anywhere to anywhere, nearly half as long as the shape is large, is not so much longer.
+// Half of the edges are so many times as long as at rest where the order changed: 20, or less in a coarse mesh, in
+// which even an edge from anywhere to anywhere, nearly half as long as the shape is large, is not so much longer.
 constexpr double kOtherOrder = 20, kLeastOtherOrder = 4, kAnywhere = 0.4;
 constexpr double kTogether = 2e-6;     // of the diagonal: vertices that stay so near are one
 constexpr double kSameFrame = 1e-6;    // of the diagonal: a frame this near to one chosen tells nothing new

@@ -308,8 +308,8 @@ void FleshCarrier::Content::add_detail(const FleshClip& clip, std::size_t frame,
             if (!(detail.norm() > least)) continue;
             const Mat3d there = gradients_there[k].cast<double>();
             const bool turns = std::abs(there.determinant()) > kFlat;
-            const Mat3d turn = turns ? nearest_rotation(gradients_here[k].cast<double>() * there.inverse())
-                                     : Mat3d(Mat3d::Identity());
+            const Mat3d turn =
+                turns ? nearest_rotation(gradients_here[k].cast<double>() * there.inverse()) : Mat3d(Mat3d::Identity());
             points[k] += turn.cast<float>() * detail;
         }
     });

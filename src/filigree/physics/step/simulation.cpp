@@ -95,7 +95,7 @@ void note_flow(const SimulationState& state, FrameReport& report) {
 }
 
 constexpr float kFollowingCrush = 0.02f; ///< of bodies that follow an animation: Elasticity::set_crush_share
-constexpr double kContactGap = 0.08;       ///< spacings, Follow::contact_gap where it is unset
+constexpr double kContactGap = 0.08;     ///< spacings, Follow::contact_gap where it is unset
 
 /// Substeps until the frame ends. What is not finite is held on the way, and the rest of the frame goes on from there;
 /// a state that is lost again and again stays as it is until the next frame. Returns how many particles were held.
