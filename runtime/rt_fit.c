@@ -545,7 +545,7 @@ size_t flg_fit_scratch_bytes(uint32_t count) {
 }
 
 /* Marks the candidates that edges between candidates connect with `own`. */
-static void reach(const flg_fit* fit, uint32_t own, flg_search* search) {
+static FLG_COLD void reach(const flg_fit* fit, uint32_t own, flg_search* search) {
     const uint32_t candidate = 2 * ++search->round;
     size_t waiting = 0;
     for (size_t k = 0; k < search->candidates.count; ++k) search->marks[search->candidates.found[k].value] = candidate;
@@ -563,7 +563,7 @@ static void reach(const flg_fit* fit, uint32_t own, flg_search* search) {
 }
 
 /* Not so where one lies in front of the other's surface. Vertices without a face have no front. */
-static int has_matter_between(const flg_fit* fit, uint32_t a, uint32_t b) {
+static FLG_COLD int has_matter_between(const flg_fit* fit, uint32_t a, uint32_t b) {
     const float *p = fit->rest + 3 * (size_t)a, *q = fit->rest + 3 * (size_t)b;
     const float *n = fit->normals + 3 * (size_t)a, *m = fit->normals + 3 * (size_t)b;
     double way[3], across;
@@ -577,7 +577,7 @@ static int counts_as_neighbour(const flg_fit* fit, const flg_search* search, uin
     return v != own && (search->marks[v] == 2 * search->round + 1 || has_matter_between(fit, own, v));
 }
 
-static void find_neighbours(const flg_fit* fit, uint32_t vertex, flg_search* search) {
+static FLG_COLD void find_neighbours(const flg_fit* fit, uint32_t vertex, flg_search* search) {
     const uint32_t own = fit->place[vertex];
     const flg_part* part = fit->parts + fit->part_of[own];
     const float* point = fit->rest + 3 * (size_t)own;
@@ -604,7 +604,7 @@ static void find_neighbours(const flg_fit* fit, uint32_t vertex, flg_search* sea
 /* ---- Weights ---- */
 
 /* Eigenvalues and unit eigenvectors (columns) of a symmetric matrix, the largest first, by Jacobi rotations. */
-FLG_APART void symmetric_eigen(double a[3][3], double values[3], double vectors[3][3]) {
+static FLG_COLD void symmetric_eigen(double a[3][3], double values[3], double vectors[3][3]) {
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) vectors[i][j] = i == j;
     for (int sweep = 0; sweep < 40 && (a[0][1] != 0 || a[0][2] != 0 || a[1][2] != 0); ++sweep)
@@ -666,7 +666,7 @@ typedef struct flg_neighbourhood {
 } flg_neighbourhood;
 
 /* The set's points go to search->points. size 0: they are all at one place. */
-static void make_neighbourhood(const flg_fit* fit, uint32_t vertex, flg_search* search, flg_neighbourhood* set) {
+static FLG_COLD void make_neighbourhood(const flg_fit* fit, uint32_t vertex, flg_search* search, flg_neighbourhood* set) {
     const float* centre = fit->rest + 3 * (size_t)vertex;
     double mean[3], covariance[3][3], values[3];
     set->count = search->found_count + 1;
@@ -703,7 +703,7 @@ static void make_neighbourhood(const flg_fit* fit, uint32_t vertex, flg_search* 
 }
 
 /* The equations of the interpolant, three right sides behind them: what gives the gradient at the first point. */
-static size_t make_equations(const flg_neighbourhood* set, flg_search* search) {
+static FLG_COLD size_t make_equations(const flg_neighbourhood* set, flg_search* search) {
     const size_t n = set->count, rank = (size_t)set->rank, size = n + 1 + rank;
     const double *x = search->points[0], *y = search->points[1], *z = search->points[2];
     memset(search->matrix, 0, size * sizeof search->matrix[0]);
@@ -726,7 +726,7 @@ static size_t make_equations(const flg_neighbourhood* set, flg_search* search) {
 }
 
 /* Solves by elimination with partial pivoting; the results are where the right sides were, in rows[i][size + k]. */
-static void solve_equations(size_t size, const flg_kernel* kernel, flg_search* search) {
+static FLG_COLD void solve_equations(size_t size, const flg_kernel* kernel, flg_search* search) {
     double** rows = search->rows;
     for (size_t i = 0; i < size; ++i) rows[i] = search->matrix[i];
     for (size_t c = 0; c < size; ++c) {
@@ -762,7 +762,7 @@ static void set_identity(float a[9]) {
     for (int k = 0; k < 9; ++k) a[k] = k % 4 == 0 ? 1.0f : 0.0f;
 }
 
-static void solve_vertex(flg_fit* fit, uint32_t vertex, flg_search* search) {
+static FLG_COLD void solve_vertex(flg_fit* fit, uint32_t vertex, flg_search* search) {
     flg_terms* terms = fit->terms + vertex;
     flg_flatness* flatness = fit->flatness + vertex;
     float* rest_error = fit->rest_error + 9 * (size_t)vertex;

@@ -194,10 +194,10 @@ TEST(RuntimeOpen, AnInfoOfAnOlderProgramIsFilledAsFarAsItGoes) {
 TEST(RuntimeOpen, HasAVersionAndASentenceForEveryStatus) {
     EXPECT_EQ(flg_abi(), FLG_ABI);
     std::set<std::string> texts;
-    for (int status = FLG_OK; status <= FLG_MISSING; ++status) texts.insert(flg_status_text(flg_status(status)));
-    EXPECT_EQ(texts.size(), std::size_t{FLG_MISSING} + 1);
+    for (int status = FLG_OK; status <= FLG_OLD_RECORDS; ++status) texts.insert(flg_status_text(flg_status(status)));
+    EXPECT_EQ(texts.size(), std::size_t{FLG_OLD_RECORDS} + 1);
     for (const std::string& text : texts) EXPECT_EQ(text.back(), '.');
-    EXPECT_STREQ(flg_status_text(flg_status(FLG_MISSING + 1)), "Unknown status.");
+    EXPECT_STREQ(flg_status_text(flg_status(FLG_OLD_RECORDS + 1)), "Unknown status.");
 }
 
 TEST(RuntimeOpen, IsCalledFromC) {
