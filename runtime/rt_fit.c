@@ -666,7 +666,8 @@ typedef struct flg_neighbourhood {
 } flg_neighbourhood;
 
 /* The set's points go to search->points. size 0: they are all at one place. */
-static FLG_COLD void make_neighbourhood(const flg_fit* fit, uint32_t vertex, flg_search* search, flg_neighbourhood* set) {
+static FLG_COLD void make_neighbourhood(const flg_fit* fit, uint32_t vertex, flg_search* search,
+                                        flg_neighbourhood* set) {
     const float* centre = fit->rest + 3 * (size_t)vertex;
     double mean[3], covariance[3][3], values[3];
     set->count = search->found_count + 1;

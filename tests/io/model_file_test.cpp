@@ -192,8 +192,9 @@ TEST(ModelFile, Int16RecordsAreRefusedWithAWayOut) {
                                        read_model_level(file, 1, "a.fil", kOneThread).error()};
     for (const Error& error : errors) {
         EXPECT_EQ(error.code, ErrorCode::unsuitable);
-        EXPECT_EQ(error.message, "a.fil has int16 records, which are no longer read; strip the mesh again, and run "
-                                 "`filigree pack --profile runtime` for a small file.");
+        EXPECT_EQ(error.message,
+                  "a.fil has int16 records, which are no longer read; strip the mesh again, and pack it for "
+                  "the runtime to make it small.");
     }
 }
 

@@ -24,8 +24,7 @@ void require_float_records(const SectionReader& in) {
     const auto kind = in.value<std::uint32_t>("bl.prec");
     if (kind == kInt16Records)
         throw FileDamage{"has int16 records, which are no longer read",
-                         "strip the mesh again, and run `filigree pack --profile runtime` for a small file",
-                         ErrorCode::unsuitable};
+                         "strip the mesh again, and pack it for the runtime to make it small", ErrorCode::unsuitable};
     if (kind != kFloatRecords) throw FileDamage{"has records of a kind that is not known"};
 }
 
