@@ -161,8 +161,8 @@ WebPage::WebPage(OutputFolder& folder, const WebLook& look, WebModel model)
 #endif
     std::error_code failed;
     if (model == WebModel::live && !fs::exists(parts_ / "live.js", failed))
-        refuse(ErrorCode::unsupported, "--live: this program was built without the page's physics, which clang 16 for "
-                                       "WebAssembly makes; run scripts/setup and build again.");
+        refuse(ErrorCode::unsupported, "--live: the page's physics is not built; run 'scripts/setup page' and then "
+                                       "'scripts/build release program'.");
 }
 
 void WebPage::write(Session& session) {
