@@ -8,7 +8,7 @@ import { open_browser, serve } from '../exchange/browser.mjs';
 import { fail } from '../exchange/tools.mjs';
 
 const [folder, corpus] = process.argv.slice(2);
-const kWait = 120000; // ms
+const kWait = 300000; // ms: software draws
 const wrong = [];
 const check = (holds, sentence) => { if (!holds) wrong.push(sentence); };
 const work = mkdtempSync(join(tmpdir(), 'filigree-site-'));
@@ -17,7 +17,7 @@ const made = (name, bytes) => (writeFileSync(join(work, name), bytes), join(work
 const server = await serve(folder), browser = await open_browser();
 const page = await browser.newPage({ viewport: { width: 400, height: 420 } });
 // Pictures are drawn in software here: fewer of them, without shadows, leave time for the rest.
-await page.addInitScript(() => { window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 100); });
+await page.addInitScript(() => { window.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 700); });
 const own = ['/', '/filigree.css', '/filigree.js'];
 page.on('request', (request) => {
   const url = request.url();
