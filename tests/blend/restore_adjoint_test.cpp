@@ -46,7 +46,6 @@ TEST(RestoreAdjoint, IsTheTransposeOfRestoring) {
                   0);
         EXPECT_EQ(adjoint.apply(std::span(pull).first(3), RunContext()).error().code, ErrorCode::mismatch);
     }
-    const Model model = strip(mesh).value().model;
     EXPECT_EQ(RestoreAdjoint::create(model, 99u, RunContext()).error().code, ErrorCode::usage);
 }
 
