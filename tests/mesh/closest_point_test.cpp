@@ -8,6 +8,10 @@
 #include <gtest/gtest.h>
 #include <random>
 
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
+
 namespace filigree {
 namespace {
 

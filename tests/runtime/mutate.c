@@ -169,7 +169,7 @@ static flg_status try_model(const unsigned char* file, size_t size) {
     }
     if (info.parts > 0) { /* a part, at a stride, where others would be written by other threads */
         const uint32_t part = (uint32_t)any(info.parts);
-        uint32_t first, count;
+        uint32_t first = 0, count = 0;
         float* spaced = (float*)malloc(16 * (size_t)info.vertices);
         if (!spaced || flg_get_part(model, part, &first, &count, NULL, NULL) != FLG_OK) fail("a part is missing");
         if (first > info.vertices || count > info.vertices - first) fail("a part has vertices that are not there");
