@@ -1086,7 +1086,7 @@ static FLG_COLD flg_status check_sizes(const flg_code_sizes* s, double most_byte
     int is_sound = 1;
     if (s->revision > FLG_CODE_REVISION) return FLG_NEWER;
     for (int k = 0; k < 3; ++k) is_sound &= fabs(s->low[k]) <= DBL_MAX;
-    is_sound &= s->step > 0 && s->step * FARTHEST <= FLT_MAX;
+    is_sound &= s->step > 0 && s->step * (double)FARTHEST <= FLT_MAX;
     is_sound &= s->vertices < FLG_NONE && s->corners < FLG_NONE - 8 && s->faces <= s->corners / 3;
     is_sound &= s->driver_vertices > 0 && s->driver_vertices <= s->vertices && s->driver_faces < FLG_NONE / 3 - 1;
     is_sound &= s->cells > 0 && s->cells < FLG_NONE / 6 && s->weight_bits <= 20;
