@@ -31,7 +31,7 @@ std::string check_above_zero(std::string& text) {
 }
 
 std::string check_whole(const std::string& text, std::int64_t least) {
-    std::int64_t number;
+    std::int64_t number = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
     const bool is_whole = error == std::errc() && end == text.data() + text.size() && number >= least;
     return is_whole ? "" : "'" + text + "' is not a whole number from " + std::to_string(least) + " up";

@@ -9,7 +9,9 @@
 #include <cstdlib>
 
 #define WIN32_LEAN_AND_MEAN
+#ifndef NOMINMAX
 #define NOMINMAX
+#endif
 #include <windows.h>
 
 #include <bcrypt.h>
