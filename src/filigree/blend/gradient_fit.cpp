@@ -2,7 +2,9 @@
 
 #include "filigree/core/parallel_for.h"
 
+#ifndef FLG_WITH_FIT_TERMS
 #define FLG_WITH_FIT_TERMS
+#endif
 #include "runtime/rt_fit.h"
 
 #include <algorithm>
