@@ -110,6 +110,18 @@ TEST(ClosestPointTree, AgreesWithBruteForceToTheBit) {
         }
 }
 
+TEST(ClosestPointTree, FindsNothingNearAPointThatIsNotFinite) {
+    const Mesh mesh = make_wavy_sphere({.resolution = 12});
+    const std::vector<Triangle> triangles = triangulate(mesh).triangles;
+    const ClosestPointTree tree(mesh.positions, triangles);
+    constexpr float kFar = std::numeric_limits<float>::infinity(), kNothing = std::numeric_limits<float>::quiet_NaN();
+    for (const Vec3f& query : {Vec3f(kFar, 0, 0), Vec3f(0, -kFar, kFar), Vec3f(kNothing, 0, 0)}) {
+        EXPECT_EQ(tree.closest(query).triangle, kNoIndex);
+        tree.each_near(query, 1, [](Index) { ADD_FAILURE(); });
+    }
+    EXPECT_NE(tree.closest(Vec3f::Constant(std::numeric_limits<float>::max())).triangle, kNoIndex);
+}
+
 TEST(ClosestPointTree, AgreesWithBruteForceOnASmoothSurface) {
     const Mesh mesh = make_wavy_sphere({.resolution = 12});
     const std::vector<Triangle> triangles = triangulate(mesh).triangles;

@@ -35,7 +35,7 @@ def closest_points(mesh, points, *, threads=0):
     ----------
     mesh : Mesh, an object with vertices and faces, or (V, F)
     points : array_like, (n, 3)
-        World coordinates.
+        World coordinates, finite as 32-bit numbers.
 
     Returns
     -------
@@ -45,6 +45,8 @@ def closest_points(mesh, points, *, threads=0):
     ------
     UnsuitableError
         No faces.
+    UsageError
+        A point that is not finite as a 32-bit number.
 
     Examples
     --------

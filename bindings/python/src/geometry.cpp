@@ -28,6 +28,9 @@ py::tuple closest_points(const py::object& given, const py::object& asked, unsig
     const MeshPtr mesh = mesh_of(given);
     if (mesh->face_count() == 0) refuse(ErrorCode::unsuitable, "The mesh has no faces, so no point of it is closest.");
     const std::vector<Vec3d> points = points_from_origin(asked, *mesh);
+    for (std::size_t i = 0; i < points.size(); ++i)
+        if (!points[i].cast<float>().allFinite())
+            refuse("points[" + std::to_string(i) + "] is not finite as a 32-bit number.");
     Closest found = LongCall{threads}([&](const RunContext& context) {
         const Triangulation cut = triangulate(*mesh);
         const ClosestPointTree tree(mesh->positions, cut.triangles, context);

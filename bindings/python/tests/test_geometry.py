@@ -71,6 +71,10 @@ def test_closest_points():
     assert (distances <= by_hand + 1e-6).all() and (distances >= by_hand - 0.02).all()
     with pytest.raises(filigree.UnsuitableError, match="no faces"):
         filigree.closest_points(filigree.Mesh(V), points)
+    with pytest.raises(filigree.UsageError, match=r"points\[1\] is not finite as a 32-bit number"):
+        filigree.closest_points((V, F), [[0, 0, 0], [-1e300, 0, 0]])
+    far = filigree.closest_points((V, F), [[1e38, 0, 0]])
+    assert far.distances[0] == pytest.approx(1e38)
 
 
 def test_signed_distances_and_winding_numbers():

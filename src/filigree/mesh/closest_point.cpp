@@ -207,7 +207,7 @@ ClosestPointTree::ClosestPointTree(ClosestPointTree&&) noexcept = default;
 ClosestPointTree& ClosestPointTree::operator=(ClosestPointTree&&) noexcept = default;
 
 SurfacePoint ClosestPointTree::closest(const Vec3f& query, double max_distance, const Vec3f& facing) const {
-    if (tree_->triangles.empty() || !(max_distance >= 0)) return {};
+    if (tree_->triangles.empty() || !(max_distance >= 0) || !query.allFinite()) return {};
     return tree_->closest(query.cast<double>(), max_distance, facing.cast<double>());
 }
 

@@ -31,9 +31,10 @@ public:
     ClosestPointTree(ClosestPointTree&&) noexcept;
     ClosestPointTree& operator=(ClosestPointTree&&) noexcept;
 
-    /// The closest point to `query` no further than max_distance; triangle is kNoIndex when there is none. The lowest
-    /// of equally close triangles. The same answer, to the bit, as from trying all triangles, as long as the query is
-    /// within 10,000 sizes of the triangles' box; further out the distance is right to 1e-8 of itself.
+    /// The closest point to `query` no further than max_distance; triangle is kNoIndex when there is none, and for a
+    /// query that is not finite. The lowest of equally close triangles. The same answer, to the bit, as from trying all
+    /// triangles, as long as the query is within 10,000 sizes of the triangles' box; further out the distance is right
+    /// to 1e-8 of itself.
     /// facing: when not zero, only triangles whose normal has a positive dot product with it count.
     SurfacePoint closest(const Vec3f& query, double max_distance = std::numeric_limits<double>::infinity(),
                          const Vec3f& facing = Vec3f::Zero()) const;
