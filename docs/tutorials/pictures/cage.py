@@ -5,7 +5,7 @@ cage.py there              pictures cage_2.png to cage_4.png: the same in a wind
 cage.py back               picture cage_5.png: dragon.ply and turned.pc2 in a window
 cage.py moments            picture cage_1.png: the cage and the dragon at three moments, of cage.obj, cage.mdd and dragon.fil
 
-The last three are for /usr/bin/python3, and need xvfb-run, xdotool and Blender 3.4.
+The last three are for /usr/bin/python3, and need xvfb-run, xdotool and Blender.
 """
 
 import math
@@ -139,7 +139,7 @@ def back():
     def _():
         clear()
         bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath("dragon.blend"))
-        bpy.ops.import_mesh.ply(filepath=os.path.abspath("dragon.ply"))
+        (bpy.ops.import_mesh.ply if bpy.app.version < (4, 0) else bpy.ops.wm.ply_import)(filepath=os.path.abspath("dragon.ply"))
         dragon = bpy.context.object
         dragon.rotation_euler.x = math.pi / 2
         bpy.ops.object.shade_smooth()
