@@ -341,7 +341,7 @@ TEST_F(KilledEverywhere, ATableIsTheOldOrTheNew) {
 TEST_F(KilledEverywhere, PicturesAreTheOldOrTheNew) {
     if (!has_opengl()) GTEST_SKIP() << "no OpenGL";
     const auto few = [](const std::string& folder, const std::string& chunk) {
-        return pictures_of(all_cases() ? "5" : "3", folder, chunk);
+        return pictures_of(all_cases() ? "5" : "2", folder, chunk);
     };
     std::vector<std::string> older = few("a", "1/1");
     older.insert(older.end(), {"--color", "#ff0000"});

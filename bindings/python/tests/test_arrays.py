@@ -13,7 +13,7 @@ from conftest import same, same_mesh
 from strange_arrays import forms_of, strange_things
 
 # scripts/python-fuzz asks for more.
-CASES = int(os.environ.get("FILIGREE_CASES", 120))
+CASES = int(os.environ.get("FILIGREE_CASES", 80))
 often = settings(max_examples=CASES, deadline=None, suppress_health_check=list(HealthCheck), database=None)
 
 FLOATS, INTEGERS = ["f2", "f4", "f8", "g"], ["i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8"]
