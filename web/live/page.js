@@ -276,7 +276,7 @@ export function show_failure(message) {
   element('failure').hidden = false;
   element('failure-cause').textContent = /WebGL/.test(message)
     ? 'This browser does not draw in three dimensions (WebGL 2); try another one, or allow it in the settings.' : message;
-  element('loading')?.remove();
+  element('loading')?.setAttribute('hidden', '');
 }
 
 /// A worker that is a part of the page's own script.

@@ -6,7 +6,7 @@ import { Page } from '../live/page.js';
 
 const kSway = 26, kSwaySeconds = 5;  // degrees, of a body that nobody has touched yet
 const kMeasured = 150;               // ms between two measurements, at least
-const kScaleOfMean = 4;              // the colours' end, in mean errors: a few points are far off
+const kScaleOfMean = 4, kLeastEnd = 1e-7; // the colours' end: in mean errors, as a few points are far off; and at least
 // From what is right to what is off.
 const kColors = [[0.13, 0.29, 0.53], [0.16, 0.55, 0.60], [0.55, 0.78, 0.44], [0.98, 0.80, 0.30], [0.88, 0.30, 0.19]];
 
@@ -22,6 +22,7 @@ export class BendPage extends Page {
     this.corners = drawnVertices(model).corners?.vertex;
     this.own_color = mesh.geometry.attributes.color;
     this.error_color = new THREE.BufferAttribute(new Uint8Array(4 * mesh.geometry.attributes.position.count), 4, true);
+    this.straighten(); // so that there is a bend to be measured, before anybody bends
   }
 
   get is_bent() { return this.mode === 'bend'; }
@@ -38,18 +39,17 @@ export class BendPage extends Page {
   }
   show_error(shows) {
     this.shows_error = shows;
-    this.measured_at = 0;
-    if (!shows) this.error = undefined;
+    this.is_measured = false;
+    this.measured_at = this.error = undefined;
     this.wear();
     this.changed();
   }
   straighten() {
-    this.bent = undefined;
     this.wanted = { bend: [0, 0, 0, 1] };
   }
-  /// The body's own look, or the error's.
+  /// The body's own look, or the error's once it is known.
   wear() {
-    const { mesh } = this.live.bodies[0], shows = this.shows_error && this.is_bent;
+    const { mesh } = this.live.bodies[0], shows = this.error && this.is_bent;
     mesh.material = shows ? this.error_material : this.own_material;
     if (shows) mesh.geometry.setAttribute('color', this.error_color);
     else if (this.own_color) mesh.geometry.setAttribute('color', this.own_color);
@@ -67,19 +67,22 @@ export class BendPage extends Page {
       this.is_measured = false;
     } else if (data.kind === 'measured') {
       this.waits_for_measure = false;
-      this.paint(data);
+      if (!this.shows_error) return;
+      this.paint(data.errors);
+      this.wear();
       this.changed();
     } else if (data.kind === 'failed') {
       this.fail(data.message);
     }
   }
-  paint({ errors, rms }) {
+  paint(errors) {
     let most = 0, sum = 0;
     for (const error of errors) {
       most = Math.max(most, error);
       sum += error;
     }
-    this.error = { rms, most, end: nice(Math.max(kScaleOfMean * sum / errors.length, 1e-7)) };
+    const mean = sum / errors.length;
+    this.error = { mean, most, end: nice(Math.max(kScaleOfMean * mean, kLeastEnd)) };
     const colors = this.error_color.array, { corners } = this, count = colors.length / 4;
     for (let k = 0; k < count; ++k) {
       const part = Math.min(errors[corners ? corners[k] : k] / this.error.end, 1) * (kColors.length - 1);
@@ -99,17 +102,18 @@ export class BendPage extends Page {
     if (!this.is_bent) return super.ask(passed);
     if (this.is_paused) return;
     if (!this.was_touched) this.sway(passed);
-    if (this.wanted && !this.waits_for_bend) {
+    if (this.waits_for_bend) return;
+    const is_due = this.bent && !this.is_measured && !this.waits_for_measure && performance.now() - (this.measured_at ?? 0) > kMeasured;
+    if (this.shows_error && is_due) { // before the next bend: a hand, or the sway, asks for one in each picture
+      this.waits_for_measure = this.is_measured = true;
+      this.measured_at = performance.now();
+      this.maker.postMessage({ kind: 'measure' });
+    } else if (this.wanted) {
       this.waits_for_bend = true;
       const values = this.spare_bend;
       this.maker.postMessage({ kind: 'bend', ...this.wanted, values }, values ? [values.buffer] : []);
       this.wanted = undefined;
       this.spare_bend = undefined;
-    } else if (this.shows_error && !this.is_measured && !this.waits_for_bend && !this.waits_for_measure && this.bent
-               && performance.now() - (this.measured_at ?? 0) > kMeasured) {
-      this.waits_for_measure = this.is_measured = true;
-      this.measured_at = performance.now();
-      this.maker.postMessage({ kind: 'measure' });
     }
   }
   /// A body that nobody has touched shows that it bends.

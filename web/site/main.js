@@ -18,7 +18,7 @@ const kPhases = [[/read/i, 'Reading it'], [/simplify|bind|sampling/, 'Taking the
   [/spacing|darts|inside|winding|scan|counting|spread/, 'Filling it with particles']];
 
 const count = (number) => number.toLocaleString('en');
-const percent = (part) => `${(100 * part).toPrecision(2).replace(/e-(\d+)/, (_, n) => `e-${n}`)} %`;
+const percent = (part) => `${(100 * part).toLocaleString('en', { maximumSignificantDigits: 2 })} %`;
 
 class Site {
   constructor() {
@@ -39,9 +39,6 @@ class Site {
 
   /// given: { file } of the visitor's, or { sample }.
   async take(given) {
-    this.given = given;
-    this.breaks = false;
-    this.has_stopped = true;
     const { file, sample } = given, name = file?.name ?? sample.label;
     const asked = ++this.runs;
     this.maker_next?.terminate();
@@ -53,14 +50,14 @@ class Site {
       const maker = this.maker_next = worker_of(maker_script);
       const read = await this.ask(maker, { kind: 'read', module: this.module, name, bytes, sample }, 'read', bytes ? [bytes] : []);
       this.module = read.module;
-      await this.make(maker, { name, read, mode: 'bend', asked });
+      await this.make(maker, { name, read, breaks: false, mode: 'bend', asked });
     } catch (cause) {
       if (asked === this.runs) this.refuse(cause.message);
     }
   }
 
-  async make(maker, { name, read, mode, asked }) {
-    const begun = performance.now(), made = await this.ask(maker, { kind: 'make', options: this.breaks ? kBrittle : kSoft }, 'made');
+  async make(maker, { name, read, breaks, mode, asked }) {
+    const begun = performance.now(), made = await this.ask(maker, { kind: 'make', options: breaks ? kBrittle : kSoft }, 'made');
     if (asked !== this.runs) return;
     this.say('Putting it into the picture');
     const file = open_page_file(made.page), bodies = await start_bodies(file);
@@ -69,7 +66,7 @@ class Site {
     if (this.maker !== maker) this.maker?.terminate();
     this.maker = maker;
     this.maker_next = undefined;
-    Object.assign(this, { name, read, file });
+    Object.assign(this, { name, read, breaks, file });
     element('title').textContent = name;
     element('failure').hidden = true;
     this.page = window.filigree = new BendPage(file, bodies, maker, () => this.show());
@@ -95,11 +92,9 @@ class Site {
 
   async toggle_breaks() {
     if (!this.maker || this.maker_next || !element('loading').hidden) return;
-    this.breaks = !this.breaks;
-    this.show();
     const asked = ++this.runs;
     try {
-      await this.make(this.maker, { name: this.name, read: this.read, mode: 'drop', asked });
+      await this.make(this.maker, { name: this.name, read: this.read, breaks: !this.breaks, mode: 'drop', asked });
     } catch (cause) {
       if (asked === this.runs) this.refuse(cause.message);
     }
@@ -120,7 +115,6 @@ class Site {
     this.maker_next?.terminate();
     this.maker_next = undefined;
     show_failure(message);
-    element('loading') ?? document.body.append(Object.assign(document.createElement('p'), { id: 'loading', hidden: true }));
   }
 
   /// What the page says of the body as it is.
@@ -141,8 +135,8 @@ class Site {
     const error = bent && page.shows_error ? page.error : undefined;
     element('legend').hidden = !error;
     if (!error) return;
-    element('error-text').textContent = `Off by ${percent(error.rms)} of its size on average, ${percent(error.most)} at most, from bending all ${count(page.live.vertices)} points.`;
-    element('ramp-end').textContent = percent(error.end);
+    element('error-text').textContent = `Off by ${percent(error.mean)} of its size on average, ${percent(error.most)} at most, from bending all ${count(page.live.vertices)} points.`;
+    element('ramp-end').textContent = `${percent(error.end)} and more`;
   }
 
   // ---- doing

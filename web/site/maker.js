@@ -74,12 +74,10 @@ export class Maker {
     driver.set(new Float32Array(this.memory, this.calls.gradients() >>> 0, 9 * count), 3 * count);
     return driver;
   }
-  /// Of each vertex how far it is from where the bend itself takes it, fractions of the diagonal; and their root mean
-  /// square.
+  /// Of each vertex how far it is from where the bend itself takes it, fractions of the diagonal.
   measure() {
     this.guarded(() => this.calls.measure());
-    const errors = new Float32Array(this.memory, this.calls.errors() >>> 0, this.calls.model_vertices()).slice();
-    return { errors, rms: this.calls.mean_error() };
+    return new Float32Array(this.memory, this.calls.errors() >>> 0, this.calls.model_vertices()).slice();
   }
 }
 

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -68,7 +69,6 @@ struct Made {
     std::vector<Vec3f> driver; ///< m, where the body starts
     std::vector<Mat3f> gradients;
     std::vector<float> errors; ///< of each vertex, fractions of the diagonal
-    double rms = 0;
 
     const Model& model() const { return ready.bodies.front().model; }
 };
@@ -83,7 +83,7 @@ RunContext context_of_page() {
 const RunContext kContext = context_of_page(), kSilent(1);
 std::string input, mesh_name;
 Mesh mesh;
-std::optional<Made> made;
+std::unique_ptr<Made> made;
 
 std::string text_of(std::size_t length) { return input.substr(0, length); }
 
@@ -111,8 +111,8 @@ Status read_file_of_user(std::size_t name_length) {
     return Success{};
 }
 
+/// Where this fails, the body that was there stays.
 Status make_page(const DropSceneOptions& options) {
-    made.reset();
     const Result<std::string> text = drop_scene(mesh, mesh_name, options);
     if (!text) return text.error();
     const Result<SceneFile> scene = parse_scene(*text, kScene);
@@ -121,13 +121,14 @@ Status make_page(const DropSceneOptions& options) {
     if (!ready) return plain(ready.error());
     Result<PageFile> page = write_page_file(*scene, *ready);
     if (!page) return page.error();
-    made.emplace();
-    made->ready = std::move(*ready);
-    made->page = std::move(*page);
-    Result<Restorer> restorer = Restorer::create(made->model(), {}, kSilent);
+    auto next = std::make_unique<Made>();
+    next->ready = std::move(*ready);
+    next->page = std::move(*page);
+    Result<Restorer> restorer = Restorer::create(next->model(), {}, kSilent);
     if (!restorer) return restorer.error();
-    made->restorer.emplace(std::move(*restorer));
-    made->diagonal = bounds(made->model().mesh).diagonal();
+    next->restorer.emplace(std::move(*restorer));
+    next->diagonal = bounds(next->model().mesh).diagonal();
+    made = std::move(next);
     return Success{};
 }
 
@@ -152,11 +153,20 @@ Bend bend_of(const Box& box, const Vec3d& from, const Vec3d& way) {
 
 std::unique_ptr<SpaceWarp> warp_of(const Box& box, const Bend& bend) {
     const Axis axis = longest_axis(box);
+    const double stretch = std::clamp(bend.stretch, kLeastStretch, kMostStretch);
     std::vector<std::unique_ptr<SpaceWarp>> warps;
-    warps.push_back(make_squeeze(box, axis, std::clamp(bend.stretch, kLeastStretch, kMostStretch)).value());
-    if (const double degrees = bend.towards.norm(); degrees > 1e-6)
+    warps.push_back(make_squeeze(box, axis, stretch).value());
+    if (const double degrees = bend.towards.norm(); degrees > 1e-6) {
+        // The arc is as long as the body is by now, and a hair longer: its curvature jumps at its ends, and there the
+        // restored surface would be off.
+        const int along = int(axis);
+        const double half = 0.5 * (1 + 1e-9) * stretch * box.size()[along], centre = box.centre()[along];
+        Box stretched = box;
+        stretched.min[along] = centre - half;
+        stretched.max[along] = centre + half;
         warps.push_back(
-            std::make_unique<TurnedBend>(box, axis, bend.towards / degrees, std::min(degrees, kMostDegrees)));
+            std::make_unique<TurnedBend>(stretched, axis, bend.towards / degrees, std::min(degrees, kMostDegrees)));
+    }
     return make_chain(std::move(warps));
 }
 
@@ -182,13 +192,8 @@ Status measure_bend() {
     const Result<std::vector<Vec3f>> restored = made->restorer->positions(made->pose, kSilent);
     if (!restored) return restored.error();
     made->errors.resize(rest.size());
-    double sum = 0;
-    for (std::size_t v = 0; v < rest.size(); ++v) {
-        const double off = ((*restored)[v] - truth[v]).cast<double>().norm() / made->diagonal;
-        made->errors[v] = float(off);
-        sum += off * off;
-    }
-    made->rms = rest.empty() ? 0 : std::sqrt(sum / double(rest.size()));
+    for (std::size_t v = 0; v < rest.size(); ++v)
+        made->errors[v] = float(((*restored)[v] - truth[v]).cast<double>().norm() / made->diagonal);
     return Success{};
 }
 
@@ -253,10 +258,8 @@ void EXPORTED(bend)(double x, double y, double z, double stretch) { bend_model({
 /// 3 numbers a driver vertex, m; and 9 of its gradient, column by column.
 const float* EXPORTED(positions)() { return made->driver.data()->data(); }
 const float* EXPORTED(gradients)() { return made->gradients.data()->data(); }
-/// How far each restored vertex is from where the bend itself takes it.
+/// How far each restored vertex is from where the bend itself takes it, fractions of the diagonal.
 int EXPORTED(measure)() { return told(measure_bend()); }
 const float* EXPORTED(errors)() { return made->errors.data(); }
-/// Root mean square, a fraction of the diagonal.
-double EXPORTED(mean_error)() { return made->rms; }
 
 } // extern "C"

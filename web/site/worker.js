@@ -37,8 +37,8 @@ const actions = {
     postMessage({ kind: 'bent', driver }, [driver.buffer]);
   },
   measure() {
-    const { errors, rms } = maker.measure();
-    postMessage({ kind: 'measured', errors, rms }, [errors.buffer]);
+    const errors = maker.measure();
+    postMessage({ kind: 'measured', errors }, [errors.buffer]);
   },
 };
 
