@@ -117,7 +117,7 @@ async function drag(x, y) {
 async function said_error() {
   await until(() => window.filigree.error && !document.getElementById('legend').hidden);
   const sentence = await page.textContent('#error-text'), end = Number.parseFloat(await page.textContent('#ramp-end'));
-  const [average, most] = (/^Off by ([\d.]+) % .* average, ([\d.]+) % .* from bending all [\d,]+ points\.$/.exec(sentence) ?? []).slice(1).map(Number);
+  const [average, most] = (/^Off by ([\d.]+)\s% .* average, ([\d.]+)\s% .* from bending all [\d,]+ points\.$/.exec(sentence) ?? []).slice(1).map(Number);
   check(0 < average && average < most && average < end, `the error is not said: ${sentence} ... ${end} %`);
   return average;
 }

@@ -18,7 +18,7 @@ const kPhases = [[/read/i, 'Reading it'], [/simplify|bind|sampling/, 'Taking the
   [/spacing|darts|inside|winding|scan|counting|spread/, 'Filling it with particles']];
 
 const count = (number) => number.toLocaleString('en');
-const percent = (part) => `${(100 * part).toLocaleString('en', { maximumSignificantDigits: 2 })} %`;
+const percent = (part) => `${(100 * part).toLocaleString('en', { maximumSignificantDigits: 2 })}\u00a0%`; // in one line
 
 class Site {
   constructor() {
