@@ -13,6 +13,10 @@ namespace filigree::python {
 
 namespace {
 
+std::vector<Mat3f> stretches_of(const py::object& given) {
+    return given.is_none() ? std::vector<Mat3f>() : gradients_of(given, "stretches");
+}
+
 /// Points that go along, and where they count from: of a driver model units and its mesh's origin.
 struct Attachment {
     SimulationPtr simulation;
@@ -447,7 +451,7 @@ UsageError
             "set_follow",
             [](PySimulation& self, std::size_t body, const py::object& frequency, const py::object& positions,
                const py::object& velocities, const py::object& damping, const py::object& leash, double leash_frequency,
-               double most_acceleration) {
+               double most_acceleration, const py::object& stretches) {
                 Follow follow;
                 if (frequency.is_none()) {
                     self.alone([&] { return self.simulation.set_follow(body, {}, {}, {}).value(); });
@@ -461,12 +465,14 @@ UsageError
                 if (positions.is_none() || velocities.is_none())
                     refuse("positions and velocities have to say where the targets are now.");
                 const Vectors at = vectors_of(positions, "positions"), moving = vectors_of(velocities, "velocities");
-                self.alone([&] { return self.simulation.set_follow(body, std::move(follow), at, moving).value(); });
+                const std::vector<Mat3f> grown = stretches_of(stretches);
+                self.alone(
+                    [&] { return self.simulation.set_follow(body, std::move(follow), at, moving, grown).value(); });
             },
             py::arg("body"), py::arg("frequency"), py::arg("positions") = py::none(),
             py::arg("velocities") = py::none(), py::kw_only(), py::arg("damping") = 3.0, py::arg("leash") = py::none(),
-            py::arg("leash_frequency") = 20.0, py::arg("most_acceleration") = 100.0,
-            R"(set_follow(self, body, frequency, positions=None, velocities=None, *, damping=3.0, leash=None, leash_frequency=20.0, most_acceleration=100.0)
+            py::arg("leash_frequency") = 20.0, py::arg("most_acceleration") = 100.0, py::arg("stretches") = py::none(),
+            R"(set_follow(self, body, frequency, positions=None, velocities=None, *, damping=3.0, leash=None, leash_frequency=20.0, most_acceleration=100.0, stretches=None)
 --
 
 Let a body's particles follow targets, from now on; `set_targets` says where these go.
@@ -486,6 +492,8 @@ leash_frequency : float
     Hz, of the spring from twice the leash on.
 most_acceleration : float
     m/s^2: particles feel no more of their target's acceleration.
+stretches : array_like, (p, 3, 3), optional
+    As those of `set_targets`, now.
 
 Raises
 ------
@@ -495,13 +503,15 @@ UsageError
         .def(
             "set_targets",
             [](PySimulation& self, std::size_t body, const py::object& positions, const py::object& velocities,
-               const py::object& accelerations) {
+               const py::object& accelerations, const py::object& stretches) {
                 const Vectors at = vectors_of(positions, "positions"), moving = vectors_of(velocities, "velocities");
                 const Vectors felt = accelerations.is_none() ? Vectors() : vectors_of(accelerations, "accelerations");
-                self.alone([&] { return self.simulation.set_targets(body, at, moving, felt).value(); });
+                const std::vector<Mat3f> grown = stretches_of(stretches);
+                self.alone([&] { return self.simulation.set_targets(body, at, moving, felt, grown).value(); });
             },
             py::arg("body"), py::arg("positions"), py::arg("velocities"), py::arg("accelerations") = py::none(),
-            R"(set_targets(self, body, positions, velocities, accelerations=None)
+            py::arg("stretches") = py::none(),
+            R"(set_targets(self, body, positions, velocities, accelerations=None, stretches=None)
 --
 
 Where the targets of a body that follows are at the end of the next frame. Without this call they stop.
@@ -513,6 +523,9 @@ positions, velocities : array_like, (p, 3)
     World, m, and m/s, as `target_velocities` makes them.
 accelerations : array_like, (p, 3), optional
     m/s^2, what particles feel during the frame beside gravity.
+stretches : array_like, (p, 3, 3), optional
+    Rest shapes of the matter at the particles at the end of the frame: symmetric matrices relative to the body at rest
+    (1.5 times the identity: half as large again). For bodies of fem that do not yield. None: as at rest.
 
 Raises
 ------

@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 
 namespace filigree {
 
@@ -247,17 +248,22 @@ public:
     /// and how they move. Particles stay where they are; set_positions puts them on the targets. A Follow without
     /// frequency lets the body go. While a body of fem follows, its cells that are crushed below 0.4 of their volume
     /// resist with 2 % of what they would: the targets hold them. The state of the targets is part of save(), the
-    /// Follow is not: before restore() call this again as it was called before save(). Errors: usage (no such body; a
-    /// body that is rigid, breaks or is of mpm; lists of another length; a number out of range).
-    Status set_follow(std::size_t body, Follow follow, const Vectors& positions, const Vectors& velocities);
+    /// Follow is not: before restore() call this again as it was called before save(). stretches: as those of
+    /// set_targets, now. Errors: usage (no such body; a body that is rigid, breaks or is of mpm; lists of another
+    /// length; a number out of range; stretches that set_targets refuses).
+    Status set_follow(std::size_t body, Follow follow, const Vectors& positions, const Vectors& velocities,
+                      std::span<const Mat3f> stretches = {});
     /// Says where the targets of a body are at the end of the next frame. Within the frame they move along a cubic
     /// curve. Without this call they stop where they are. A way that is too long for the velocities (a teleport, a turn
     /// within a frame) is not travelled: the particles are put where their targets jump to, as far as they jump.
     /// positions: m. velocities: m/s, as target_velocities makes them. accelerations: m/s^2, what particles feel during
-    /// the frame in addition to gravity; or empty. Cost O(particles). Errors: usage (no such body; it does not follow;
-    /// another number of particles; a number that is not finite).
+    /// the frame in addition to gravity; or empty. stretches: the rest shape of the matter at each particle at the end
+    /// of the frame, a symmetric matrix relative to the body at rest (1.5 times the identity: half as large again), to
+    /// which it grows evenly; the mass stays. Empty: as at rest. Cost O(particles). Errors: usage (no such body; it
+    /// does not follow; another number of particles; a number that is not finite; stretches of a body that yields or is
+    /// not of fem; a stretch that is not symmetric, or shrinks or grows anything by more than eight times).
     Status set_targets(std::size_t body, const Vectors& positions, const Vectors& velocities,
-                       const Vectors& accelerations = {});
+                       const Vectors& accelerations = {}, std::span<const Mat3f> stretches = {});
 
     /// Replaces the gravity of the world, m/s^2, from now on; what sleeps wakes where it changes. save() does not keep
     /// it. Errors: usage (a number that is not finite).

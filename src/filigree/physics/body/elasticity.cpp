@@ -23,6 +23,9 @@ ElasticReport Elasticity::damped_forces(const Vectors& positions, const Internal
 }
 void Elasticity::finish_substep(const Vectors&, float, const RunContext&) {}
 void Elasticity::set_crush_share(float) {}
+bool Elasticity::can_grow() const { return false; }
+void Elasticity::set_rest_stretches(std::span<const RestStretch>, std::span<const RestStretch>) {}
+void Elasticity::set_part_of_frame(float) {}
 std::size_t Elasticity::flowed_out() const { return 0; }
 std::span<const PlasticCell> Elasticity::plastic_cells() const { return {}; }
 void Elasticity::take_over(std::span<const PlasticCell>, std::span<const Index>) {}

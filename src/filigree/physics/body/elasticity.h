@@ -5,6 +5,7 @@
 #include "filigree/physics/body.h"
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <span>
 #include <string>
@@ -44,6 +45,9 @@ struct InternalDamping {
     }
 };
 
+/// A symmetric matrix that the rest shape is stretched by: xx, yy, zz, xy, xz, yz.
+using RestStretch = std::array<float, 6>;
+
 /// Elastic behaviour of one body: the body's arrays in the order its loops want, plus what is stored inside (plastic
 /// strain). The body must outlive it. Const functions may run at the same time; others use scratch.
 class Elasticity {
@@ -77,6 +81,12 @@ public:
     /// How strongly crushed matter resists to be crushed further, of 1; materials without such a law do nothing. What
     /// an animation crushes would take ten times as many substeps, and comes back by itself.
     virtual void set_crush_share(float share);
+
+    /// Rest shapes at the particles at the start and at the end of a frame; empty: as the body is. Only materials that
+    /// can_grow take them. Between the two the rest shape is what set_part_of_frame says, at first the start's.
+    virtual bool can_grow() const;
+    virtual void set_rest_stretches(std::span<const RestStretch> from, std::span<const RestStretch> to);
+    virtual void set_part_of_frame(float part);
 
     /// Stored state as bytes, and back; empty for elastic materials. restore_state is false for bytes of another body.
     virtual std::string state() const;

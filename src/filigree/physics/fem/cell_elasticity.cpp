@@ -5,6 +5,7 @@
 #include "filigree/physics/body/fields.h"
 #include "filigree/physics/body/make_cells.h"
 #include "filigree/physics/fem/cell_kernel.h"
+#include "filigree/physics/fem/cell_lanes.h"
 
 #include <bit>
 #include <cmath>
@@ -15,11 +16,26 @@ namespace filigree {
 
 namespace {
 
-/// The energy of one cell, J, from its corners in doubles.
-double cell_energy(const cell_kernel::CellMaterial& m, const std::array<Vec3d, 8>& corners, float filled) {
+using Growth = cell_kernel::Plan::Growth;
+
+/// What Plan::Growth says of one cell.
+using GrownCell = std::array<float, Growth::kNumbers>;
+
+/// The energy of one cell, J, from its corners in doubles. grown: null, or of a rest shape that is stretched; its share
+/// is the caller's.
+double cell_energy(const cell_kernel::CellMaterial& m, const std::array<Vec3d, 8>& corners, float filled,
+                   const GrownCell* grown) {
     std::array<Vec3d, 8> X = corners;
     const double fraction = double(filled);
     cell_kernel::transform_corners(X);
+    if (grown) {
+        const auto back = [&](std::size_t k) { return double((*grown)[k]); };
+        const Vec3d x = X[1], y = X[2], z = X[4];
+        X[1] = back(0) * x + back(3) * y + back(4) * z;
+        X[2] = back(3) * x + back(1) * y + back(5) * z;
+        X[4] = back(4) * x + back(5) * y + back(2) * z;
+        for (const int n : {3, 5, 6, 7}) X[n] *= back(Growth::kBent);
+    }
     const double h = m.spacing, size = 4 * h;
     const double I_bent =
         ((X[3].squaredNorm() + X[5].squaredNorm() + X[6].squaredNorm()) * (2.0 / 3.0) + X[7].squaredNorm() / 3.0) /
@@ -31,6 +47,35 @@ double cell_energy(const cell_kernel::CellMaterial& m, const std::array<Vec3d, 8
     return fraction * h * h * h *
            (shear * (0.5 * ((I - 3) - math::log1p((I - 3) / 4)) + cell_kernel::bent_energy(I_bent)) +
             bulk * (0.5 * (J - 1) * (J + 1 - 2 * g) + cell_kernel::crush_energy(m, J, filled)));
+}
+
+/// Of a cell whose corners have these rest stretches: their mean counts.
+GrownCell grown_cell(std::span<const RestStretch> stretches, const std::array<Index, 8>& corners, float stiffness) {
+    RestStretch mean = {};
+    for (const Index corner : corners)
+        for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += 0.125f * stretches[corner][k];
+    Mat3d stretch;
+    stretch << double(mean[0]), double(mean[3]), double(mean[4]), double(mean[3]), double(mean[1]), double(mean[5]),
+        double(mean[4]), double(mean[5]), double(mean[2]);
+    const Mat3d back = stretch.inverse();
+    const double volume = stretch.determinant();
+    return {float(back(0, 0)),
+            float(back(1, 1)),
+            float(back(2, 2)),
+            float(back(0, 1)),
+            float(back(0, 2)),
+            float(back(1, 2)),
+            float(1 / math::cbrt(volume)),
+            float(volume) * stiffness};
+}
+constexpr GrownCell kAsAtRest = {1, 1, 1, 0, 0, 0, 1, 1};
+
+/// A bound on what it multiplies the stiffness of a cell by.
+float growth_of_stiffness(const GrownCell& cell) {
+    const auto row = [](float a, float b, float c) { return std::abs(a) + std::abs(b) + std::abs(c); };
+    const float most = std::max({row(cell[0], cell[3], cell[4]), row(cell[3], cell[1], cell[5]),
+                                 row(cell[4], cell[5], cell[2])}); // no eigenvalue is above it
+    return most * most;
 }
 
 /// A lattice without copies of corners, for the loops of cell_kernel: cells beside each other that do not hang together
@@ -57,6 +102,7 @@ public:
             indices.push_back(at);
             own.push_back(cell);
         }
+        own_ = own;
         body_.material = body.material;
         body_.cells = lattice_cells(std::move(indices), cells.spacing, cells.origin);
         body_.fields = part_of(body.fields, own);
@@ -75,6 +121,7 @@ public:
     }
 
     const Body& body() const { return body_; }
+    Index own(Index cell) const { return own_[cell]; } ///< the body's number of a cell
     Vectors& forces() { return scratch_; }
     /// The corners of this lattice where the body's are.
     const Vectors& gathered(const Vectors& from, Vectors& to) const {
@@ -126,6 +173,7 @@ private:
         Index first, own, count; ///< corners from `first` on are the body's from `own` on
     };
     std::vector<Stretch> stretches_;
+    std::vector<Index> own_;
     std::size_t corners_ = 0;
     Vectors scratch_, positions_, velocities_;
 };
@@ -154,7 +202,12 @@ public:
         return parallel_sum(context, cells.cells.size(), 1024, [&](std::size_t cell) {
             std::array<Vec3d, 8> corners;
             for (int c = 0; c < 8; ++c) corners[c] = positions[cells.cell_corners[cell][c]].cast<double>();
-            const double energy = cell_energy(plan_.material, corners, cells.fraction[cell]);
+            if (plan_.grows()) {
+                const GrownCell grown = grown_at(cell, part_);
+                return double(grown[Growth::kShare]) *
+                       cell_energy(plan_.material, corners, cells.fraction[cell], &grown);
+            }
+            const double energy = cell_energy(plan_.material, corners, cells.fraction[cell], nullptr);
             return stiffness.empty() ? energy : energy * double(stiffness[cell]);
         });
     }
@@ -167,7 +220,56 @@ public:
         plan_.material.crush = share * cell_kernel::cell_material(body_.material, body_.spacing()).crush;
     }
 
+    bool can_grow() const override { return true; }
+
+    void set_rest_stretches(std::span<const RestStretch> from, std::span<const RestStretch> to) override {
+        Growth& growth = plan_.growth;
+        if (from.empty() && to.empty()) {
+            growth = {};
+            from_.clear();
+            to_.clear();
+            return;
+        }
+        const std::size_t count = body_.cells.cells.size();
+        const auto ends_of = [&](std::span<const RestStretch> stretches) {
+            std::vector<GrownCell> ends(count, kAsAtRest);
+            for (std::size_t c = 0; c < count; ++c) {
+                const float stiffness = body_.fields.stiffness.empty() ? 1 : body_.fields.stiffness[c];
+                ends[c][Growth::kShare] = stiffness;
+                if (!stretches.empty()) ends[c] = grown_cell(stretches, body_.cells.cell_corners[c], stiffness);
+            }
+            return ends;
+        };
+        from_ = ends_of(from);
+        to_ = ends_of(to);
+        for (std::vector<float>& numbers : growth.numbers) numbers.assign(count + cell_kernel::kPadding, 0);
+        growth.pace.assign(count + cell_kernel::kPadding, 0);
+        for (Index place = 0; place < count; ++place) { // the most of the frame
+            const Index c = own(place);
+            const float density = body_.fields.density.empty() ? 1 : body_.fields.density[c];
+            growth.pace[place] = std::max(from_[c][Growth::kShare], to_[c][Growth::kShare]) / density *
+                                 std::max(growth_of_stiffness(from_[c]), growth_of_stiffness(to_[c]));
+        }
+        set_part_of_frame(0);
+    }
+
+    void set_part_of_frame(float part) override {
+        if (!plan_.grows()) return;
+        part_ = part;
+        for (Index place = 0; place < from_.size(); ++place) {
+            const GrownCell now = grown_at(own(place), part);
+            for (std::size_t k = 0; k < now.size(); ++k) plan_.growth.numbers[k][place] = now[k];
+        }
+    }
+
 private:
+    Index own(Index place) const { return stacked_ ? stacked_->own(place) : place; }
+    GrownCell grown_at(std::size_t cell, float part) const {
+        GrownCell now = from_[cell];
+        for (std::size_t k = 0; k < now.size(); ++k) now[k] += part * (to_[cell][k] - now[k]);
+        return now;
+    }
+
     ElasticReport stacked_forces(const Vectors& positions, const InternalDamping* damping, Vectors& forces,
                                  const RunContext& context) {
         InternalDamping inside;
@@ -185,6 +287,8 @@ private:
     std::optional<StackedCells> stacked_; ///< of a body whose corners have copies
     cell_kernel::Plan plan_;
     cell_kernel::Sums sums_;
+    std::vector<GrownCell> from_, to_; ///< of the body's cells, at the ends of a frame; empty: as at rest
+    float part_ = 0;
 };
 
 } // namespace

@@ -83,15 +83,47 @@ struct CellLoad {
     }
 };
 
-/// Moves sums to where damping has forces computed. Returns the time that cells are damped by, s.
+/// Which numbers cells have of their own: those of CellNumbers.
+enum class CellKind { same, varied, grown };
+
+/// Numbers a cell: Plan's. Those that its kind does not have are null.
+struct CellNumbers {
+    const float *fraction, *stiffness, *pace;
+    std::array<const float*, Plan::Growth::kNumbers> growth;
+};
+
+/// The inverse of N cells' stretches G: their energy is that of F G^-1.
 template <int N>
+struct BackStretch {
+    using Float = typename LaneTypes<N>::Float;
+    Float xx, yy, zz, xy, xz, yz, bent;
+    FILIGREE_INLINE BackStretch(const CellNumbers& cells, std::size_t cell) {
+        using L = CellLanes<N>;
+        const auto& of = cells.growth;
+        xx = L::load(of[0] + cell), yy = L::load(of[1] + cell), zz = L::load(of[2] + cell);
+        xy = L::load(of[3] + cell), xz = L::load(of[4] + cell), yz = L::load(of[5] + cell);
+        bent = L::load(of[Plan::Growth::kBent] + cell);
+    }
+    /// Of sums; and, as it is symmetric, of derivatives by them.
+    FILIGREE_INLINE void apply(Vectors3<N>* X) const {
+        const Vectors3<N> x = X[1], y = X[2], z = X[4];
+        X[1] = (xx * x + xy * y) + xz * z;
+        X[2] = (xy * x + yy * y) + yz * z;
+        X[4] = (xz * x + yz * y) + zz * z;
+        for (const int m : {3, 5, 6, 7}) X[m] = bent * X[m];
+    }
+};
+
+/// Moves sums to where damping has forces computed. Returns the time that cells are damped by, s.
+template <int N, CellKind Kind>
 FILIGREE_INLINE typename LaneTypes<N>::Float
 look_ahead(const Factors& f, const CellLoad<N>& now, typename LaneTypes<N>::Float stiffness, const Vectors& velocities,
-           const Cells::Run& run, Index i, CellSums<N>& sums) {
+           const Cells::Run& run, Index i, const CellNumbers& cells, CellSums<N>& sums) {
     using L = CellLanes<N>;
     using Float = typename L::Float;
     CellSums<N> v;
     transform<N>(velocities, run.rows, i, v);
+    if constexpr (Kind == CellKind::grown) BackStretch<N>(cells, run.first_cell + i).apply(v.X);
     const Float usual = f.seconds * (stiffness > f.stiffest ? f.stiffest / stiffness : Float{} + 1.0f);
     const Float flat = 1.0f - now.shape.J * (1 / InternalDamping::kDampedBelow);
     const Float seconds = L::most(usual, f.crushed_seconds * L::least(L::most(flat, Float{}), Float{} + 1.0f));
@@ -108,11 +140,6 @@ struct Motion {
     const Vectors* velocities; ///< of internal damping
 };
 
-/// Numbers a cell: Plan's. Without Varies the last two are null.
-struct CellNumbers {
-    const float *fraction, *stiffness, *pace;
-};
-
 /// What the cells on the left of a block's first corners add to them: sums over x of the right corners' forces, for
 /// y, z and both.
 template <int N>
@@ -122,7 +149,7 @@ struct Carry {
 
 /// Forces of cells i .. i + N - 1 of a run (of which the first `count` are meant where Tail), added to corners i ..
 /// i + N - 1.
-template <int N, bool Damped, bool Varies, bool Tail>
+template <int N, bool Damped, CellKind Kind, bool Tail>
 FILIGREE_INLINE void add_forces(const Factors& f, const Motion& motion, const Cells::Run& run, Index i, Index count,
                                 const CellNumbers& cells, float* const* sums, Carry<N>& carry, Extremes<N>& extremes) {
     using L = CellLanes<N>;
@@ -130,15 +157,16 @@ FILIGREE_INLINE void add_forces(const Factors& f, const Motion& motion, const Ce
     using Int = typename L::Int;
     CellSums<N> s;
     transform<N>(motion.positions, run.rows, i, s);
+    if constexpr (Kind == CellKind::grown) BackStretch<N>(cells, run.first_cell + i).apply(s.X);
     const Float filled = L::load(cells.fraction + run.first_cell + i);
     CellLoad<N> load(f, s, filled);
     Float share = filled, pace = {};
-    if constexpr (Varies) {
+    if constexpr (Kind != CellKind::same) {
         share = filled * L::load(cells.stiffness + run.first_cell + i);
         pace = L::load(cells.pace + run.first_cell + i);
     }
     const auto stiffness_of = [&](const CellLoad<N>& of) __attribute__((always_inline)) {
-        if constexpr (Varies)
+        if constexpr (Kind != CellKind::same)
             return pace * of.stiffness(f);
         else
             return of.stiffness(f);
@@ -146,7 +174,7 @@ FILIGREE_INLINE void add_forces(const Factors& f, const Motion& motion, const Ce
     Float stiffness = stiffness_of(load), seconds = {};
     const Float J = load.shape.J, I_now = load.I;
     if constexpr (Damped) {
-        seconds = look_ahead<N>(f, load, stiffness, *motion.velocities, run, i, s);
+        seconds = look_ahead<N, Kind>(f, load, stiffness, *motion.velocities, run, i, cells, s);
         load = CellLoad<N>(f, s, filled);
         stiffness = L::most(stiffness, stiffness_of(load));
     }
@@ -164,6 +192,7 @@ FILIGREE_INLINE void add_forces(const Factors& f, const Motion& motion, const Ce
     P[5] = bent * s.X[5];
     P[6] = bent * s.X[6];
     P[7] = last * s.X[7];
+    if constexpr (Kind == CellKind::grown) BackStretch<N>(cells, run.first_cell + i).apply(P);
 
     if constexpr (Tail) {
         const Int mask = L::first(count);
@@ -217,11 +246,11 @@ FILIGREE_INLINE void add_last_corner(const Cells::Run& run, float* const* sums, 
 }
 
 /// Forces of a run's cells from i on, in blocks of N and then of as few as the rest needs.
-template <int N, bool Damped, bool Varies>
+template <int N, bool Damped, CellKind Kind>
 FILIGREE_INLINE void add_run(const Factors& f, const Motion& motion, const Cells::Run& run, Index i,
                              const CellNumbers& cells, float* const* sums, Carry<N>& carry, Extremes<N>& extremes) {
     for (; i + N <= run.count; i += N)
-        add_forces<N, Damped, Varies, false>(f, motion, run, i, N, cells, sums, carry, extremes);
+        add_forces<N, Damped, Kind, false>(f, motion, run, i, N, cells, sums, carry, extremes);
     const Index rest = run.count - i;
     if (rest == 0) return add_last_corner<N>(run, sums, carry);
     if constexpr (N > 4)
@@ -232,14 +261,14 @@ FILIGREE_INLINE void add_run(const Factors& f, const Motion& motion, const Cells
                 half_carry.right[u] = {L::last_half(carry.right[u].x), L::last_half(carry.right[u].y),
                                        L::last_half(carry.right[u].z)};
             Extremes<N / 2> half;
-            add_run<N / 2, Damped, Varies>(f, motion, run, i, cells, sums, half_carry, half);
+            add_run<N / 2, Damped, Kind>(f, motion, run, i, cells, sums, half_carry, half);
             extremes.rate = L::most(extremes.rate, L::twice(half.rate));
             extremes.damping = L::most(extremes.damping, L::twice(half.damping));
             extremes.I = L::most(extremes.I, L::twice(half.I));
             extremes.J = L::least(extremes.J, L::twice(half.J));
             return;
         }
-    add_forces<N, Damped, Varies, true>(f, motion, run, i, rest, cells, sums, carry, extremes);
+    add_forces<N, Damped, Kind, true>(f, motion, run, i, rest, cells, sums, carry, extremes);
 }
 
 struct ForceJob {
@@ -250,11 +279,16 @@ struct ForceJob {
     std::span<ElasticReport> reports; ///< one a slab
 };
 
-template <int N, bool Damped, bool Varies>
+template <int N, bool Damped, CellKind Kind>
 FILIGREE_INLINE void add_slabs(const ForceJob& job, std::size_t begin, std::size_t end) {
     const Plan& plan = job.plan;
     const Factors& factors = job.factors;
-    const CellNumbers cells{plan.fraction.data(), plan.stiffness.data(), plan.pace.data()};
+    CellNumbers cells{plan.fraction.data(), plan.stiffness.data(), plan.pace.data(), {}};
+    if constexpr (Kind == CellKind::grown) {
+        std::ranges::transform(plan.growth.numbers, cells.growth.begin(), [](const auto& of) { return of.data(); });
+        cells.stiffness = cells.growth[Plan::Growth::kShare];
+        cells.pace = plan.growth.pace.data();
+    }
     for (std::size_t index = begin; index < end; ++index) {
         const Slab& slab = plan.slabs[index];
         Vectors& to = job.sums.of_parity[index % 2];
@@ -273,7 +307,7 @@ FILIGREE_INLINE void add_slabs(const ForceJob& job, std::size_t begin, std::size
                                     to.y.data() + shift + kPadding,
                                     to.z.data() + shift + kPadding};
             Carry<N> carry = {};
-            add_run<N, Damped, Varies>(factors, job.motion, run, 0, cells, sums, carry, extremes);
+            add_run<N, Damped, Kind>(factors, job.motion, run, 0, cells, sums, carry, extremes);
         }
         ElasticReport& report = job.reports[index];
         float rate = 0, damping = 0, J = extremes.J[0], I = 0;
@@ -293,33 +327,39 @@ FILIGREE_INLINE void add_slabs(const ForceJob& job, std::size_t begin, std::size
 using ForceFunction = void (*)(const ForceJob&, std::size_t, std::size_t);
 
 #if defined(FILIGREE_HAS_WIDTHS)
-template <bool Damped, bool Varies>
+template <bool Damped, CellKind Kind>
 FILIGREE_AVX512 void add_slabs_avx512(const ForceJob& job, std::size_t begin, std::size_t end) {
-    add_slabs<16, Damped, Varies>(job, begin, end);
+    add_slabs<16, Damped, Kind>(job, begin, end);
 }
-template <bool Damped, bool Varies>
+template <bool Damped, CellKind Kind>
 FILIGREE_AVX2 void add_slabs_avx2(const ForceJob& job, std::size_t begin, std::size_t end) {
-    add_slabs<8, Damped, Varies>(job, begin, end);
+    add_slabs<8, Damped, Kind>(job, begin, end);
 }
 #endif
-template <bool Damped, bool Varies>
+template <bool Damped, CellKind Kind>
 void add_slabs_plain(const ForceJob& job, std::size_t begin, std::size_t end) {
-    add_slabs<4, Damped, Varies>(job, begin, end);
+    add_slabs<4, Damped, Kind>(job, begin, end);
 }
 
-template <bool Damped, bool Varies>
+template <bool Damped, CellKind Kind>
 ForceFunction force_function(int lanes) {
 #if defined(FILIGREE_HAS_WIDTHS)
-    if (lanes == 16) return add_slabs_avx512<Damped, Varies>;
-    if (lanes == 8) return add_slabs_avx2<Damped, Varies>;
+    if (lanes == 16) return add_slabs_avx512<Damped, Kind>;
+    if (lanes == 8) return add_slabs_avx2<Damped, Kind>;
 #endif
     assert(lanes == 4);
-    return add_slabs_plain<Damped, Varies>;
+    return add_slabs_plain<Damped, Kind>;
 }
 
-ForceFunction force_function(int lanes, bool is_damped, bool varies) {
-    if (varies) return is_damped ? force_function<true, true>(lanes) : force_function<false, true>(lanes);
-    return is_damped ? force_function<true, false>(lanes) : force_function<false, false>(lanes);
+template <CellKind Kind>
+ForceFunction force_function(int lanes, bool is_damped) {
+    return is_damped ? force_function<true, Kind>(lanes) : force_function<false, Kind>(lanes);
+}
+
+ForceFunction force_function(int lanes, bool is_damped, const Plan& plan) {
+    if (plan.grows()) return force_function<CellKind::grown>(lanes, is_damped);
+    if (!plan.stiffness.empty()) return force_function<CellKind::varied>(lanes, is_damped);
+    return force_function<CellKind::same>(lanes, is_damped);
 }
 
 Factors factors_of(const Plan& plan, const InternalDamping* damping) {
@@ -375,7 +415,7 @@ ElasticReport forces(const Plan& plan, const Vectors& positions, Vectors& forces
     std::vector<ElasticReport> reports(plan.slabs.size());
     const Motion motion{positions, damping ? &damping->velocities : nullptr};
     const ForceJob job{plan, motion, factors_of(plan, damping), sums, reports};
-    const ForceFunction add_slabs_of = force_function(lanes, damping != nullptr, !plan.stiffness.empty());
+    const ForceFunction add_slabs_of = force_function(lanes, damping != nullptr, plan);
     parallel_for(context, plan.slabs.size(), 1,
                  [&](std::size_t begin, std::size_t end) { add_slabs_of(job, begin, end); });
 

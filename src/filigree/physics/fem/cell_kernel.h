@@ -78,6 +78,15 @@ struct Plan {
     /// Of a body whose stiffness or density varies, padded with zeros; else empty: stiffness of each cell, and of it
     /// over density, as multiples of the material's.
     std::vector<float> stiffness, pace;
+    /// Of a body whose rest shape is stretched, padded with zeros; else empty.
+    struct Growth {
+        /// Of each cell: the inverse of the stretch (xx, yy, zz, xy, xz, yz), what its bending is multiplied by, and
+        /// the volume that its rest shape has, times its stiffness.
+        static constexpr std::size_t kBent = 6, kShare = 7, kNumbers = 8;
+        std::array<std::vector<float>, kNumbers> numbers;
+        std::vector<float> pace; ///< stiffness over density, as what it was
+    } growth;
+    bool grows() const { return !growth.pace.empty(); }
     std::vector<std::size_t> layer_starts; ///< first corner of each layer; one more at the end
     std::vector<std::size_t> run_layers;   ///< of each run's lower corners
     std::vector<Slab> slabs;

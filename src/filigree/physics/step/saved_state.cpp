@@ -14,7 +14,7 @@ namespace {
 // The name of the format, its version last. C: contacts are pairs of one kind; obstacles that were set, and what
 // touched in the last frame.
 constexpr std::uint64_t kMagic = 0x43455441'54534c46;            // "FLSTATEC"
-constexpr std::uint64_t kMagicWithTargets = 0x46455441'54534c46; // "FLSTATEF": bodies follow targets
+constexpr std::uint64_t kMagicWithTargets = 0x47455441'54534c46; // "FLSTATEG": bodies follow targets
 static_assert(sizeof(SetMotion) == sizeof(std::uint64_t) + 26 * sizeof(double), "padding would be saved");
 static_assert(sizeof(ContactEvents::PairMemory) == 2 * sizeof(std::uint64_t) + 2 * sizeof(Index) + 2 * sizeof(Vec3f),
               "padding would be saved");
@@ -126,11 +126,13 @@ void write_targets(ByteWriter& writer, std::span<const TargetsMemory> targets) {
             writer.value(std::uint64_t(vectors->size()));
             writer.vectors(*vectors);
         }
+        writer.array(std::span(of.from_stretches));
+        writer.array(std::span(of.to_stretches));
     }
 }
 
 std::vector<TargetsMemory> read_targets(ByteReader& reader) {
-    std::vector<TargetsMemory> targets(reader.count(7 * sizeof(std::uint64_t)));
+    std::vector<TargetsMemory> targets(reader.count(9 * sizeof(std::uint64_t)));
     for (TargetsMemory& of : targets) {
         of.actor = reader.value<std::uint64_t>();
         of.is_set = reader.value<std::uint64_t>();
@@ -139,6 +141,8 @@ std::vector<TargetsMemory> read_targets(ByteReader& reader) {
             Vectors read = reader.vectors(count);
             if (count > 0) *vectors = std::move(read);
         }
+        of.from_stretches = reader.array<RestStretch>();
+        of.to_stretches = reader.array<RestStretch>();
     }
     return targets;
 }

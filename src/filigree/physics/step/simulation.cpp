@@ -296,7 +296,20 @@ Status Simulation::set_forces(std::size_t body, const Vectors& newtons) {
     return Success{};
 }
 
-Status Simulation::set_follow(std::size_t body, Follow follow, const Vectors& positions, const Vectors& velocities) {
+namespace {
+
+Status check_growth(const BodyState& state, std::size_t body, std::span<const Mat3f> stretches) {
+    if (!stretches.empty() && !state.elasticity->can_grow())
+        return usage("Body " + std::to_string(body) +
+                     " yields or is not of the model fem, and only elastic bodies of fem grow.");
+    const std::string wrong = check_stretches(stretches, state.body->particle_count());
+    return wrong.empty() ? Status(Success{}) : Status(usage(wrong));
+}
+
+} // namespace
+
+Status Simulation::set_follow(std::size_t body, Follow follow, const Vectors& positions, const Vectors& velocities,
+                              std::span<const Mat3f> stretches) {
     if (Status checked = check_body(body); !checked) return checked;
     std::vector<Targets>& targets = state_->targets;
     const auto place = std::ranges::lower_bound(targets, body, {}, [](const Targets& t) { return t.memory.actor; });
@@ -320,6 +333,7 @@ Status Simulation::set_follow(std::size_t body, Follow follow, const Vectors& po
     if (Status checked = check_finite(body, positions, "target"); !checked) return checked;
     if (Status checked = check_finite(body, velocities, "target velocity"); !checked) return checked;
     if (const std::string wrong = check_follow(follow, positions.size()); !wrong.empty()) return usage(wrong);
+    if (Status checked = check_growth(state, body, stretches); !checked) return checked;
     release_targets(*state_, state);
     state_->contacts.set_passing(
         state_->slot_of[body],
@@ -328,6 +342,8 @@ Status Simulation::set_follow(std::size_t body, Follow follow, const Vectors& po
     state_->contacts.set_own_gap(state_->slot_of[body],
                                  float(follow.contact_gap.value_or(kContactGap * state.body->spacing())));
     Targets made(body, std::move(follow), positions, velocities, state.body->spacing());
+    made.memory.from_stretches = rest_stretches(stretches);
+    state.elasticity->set_rest_stretches(made.memory.from_stretches, made.memory.from_stretches);
     state.follows = true;
     state.elasticity->set_crush_share(kFollowingCrush);
     for (const Index i : made.held) {
@@ -342,7 +358,7 @@ Status Simulation::set_follow(std::size_t body, Follow follow, const Vectors& po
 }
 
 Status Simulation::set_targets(std::size_t body, const Vectors& positions, const Vectors& velocities,
-                               const Vectors& accelerations) {
+                               const Vectors& accelerations, std::span<const Mat3f> stretches) {
     if (Status checked = check_count(body, positions, "targets"); !checked) return checked;
     if (Status checked = check_count(body, velocities, "target velocities"); !checked) return checked;
     if (accelerations.size() > 0)
@@ -353,7 +369,8 @@ Status Simulation::set_targets(std::size_t body, const Vectors& positions, const
     const auto found = std::ranges::find(state_->targets, body, [](const Targets& t) { return t.memory.actor; });
     if (found == state_->targets.end())
         return usage("Body " + std::to_string(body) + " follows no targets; call set_follow first.");
-    found->set(positions, velocities, accelerations);
+    if (Status checked = check_growth(state_->body_of(body), body, stretches); !checked) return checked;
+    found->set(positions, velocities, accelerations, rest_stretches(stretches));
     return Success{};
 }
 

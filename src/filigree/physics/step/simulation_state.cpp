@@ -42,7 +42,11 @@ bool restore_targets(SimulationState& state, std::vector<TargetsMemory>& saved) 
     if (saved.size() != state.targets.size()) return false;
     for (std::size_t t = 0; t < saved.size(); ++t)
         if (!state.targets[t].takes(saved[t])) return false;
-    for (std::size_t t = 0; t < saved.size(); ++t) state.targets[t].memory = std::move(saved[t]);
+    for (std::size_t t = 0; t < saved.size(); ++t) {
+        TargetsMemory& memory = state.targets[t].memory;
+        memory = std::move(saved[t]);
+        state.body_of(memory.actor).elasticity->set_rest_stretches(memory.from_stretches, memory.from_stretches);
+    }
     return true;
 }
 

@@ -20,6 +20,7 @@ constexpr float kMostSpeed = 3;             ///< times the mean of a frame: a cu
 /// Of 1 / substep^2: with a stiffer spring Verlet's steps, which kSafety has near their limit, would be unstable.
 constexpr float kStiffest = 0.5f;
 constexpr float kLeashDamping = 0.5f; ///< of critical
+constexpr float kMostGrowth = 8;      ///< of a rest shape, in any direction
 
 float squared_rate(double hertz) {
     const double rate = 2 * std::numbers::pi * hertz;
@@ -30,6 +31,21 @@ Vec3f no_longer(const Vec3f& v, float most) {
     const float length = v.norm();
     return length > most ? Vec3f(most / length * v) : v;
 }
+/// Whether all eigenvalues of a symmetric matrix are above 0 [Sylvester].
+bool is_positive(const Mat3f& m) {
+    return m(0, 0) > 0 && m(0, 0) * m(1, 1) - m(0, 1) * m(1, 0) > 0 && m.determinant() > 0;
+}
+
+/// Of a saved state: none, or as many that a cell can have.
+bool is_sound(std::span<const RestStretch> stretches, std::size_t count) {
+    std::vector<Mat3f> matrices;
+    for (const RestStretch& s : stretches) {
+        Mat3f& m = matrices.emplace_back();
+        m << s[0], s[3], s[4], s[3], s[1], s[5], s[4], s[5], s[2];
+    }
+    return check_stretches(matrices, count).empty();
+}
+
 /// What is left of a vector when so much is taken off its length.
 Vec3f beyond(const Vec3f& v, float most) {
     const float length = v.norm();
@@ -79,6 +95,28 @@ std::string check_follow(const Follow& follow, std::size_t count) {
     return "";
 }
 
+std::string check_stretches(std::span<const Mat3f> stretches, std::size_t count) {
+    if (stretches.empty()) return "";
+    if (stretches.size() != count)
+        return "stretches has " + std::to_string(stretches.size()) + " matrices for " + std::to_string(count) +
+               " particles.";
+    for (std::size_t i = 0; i < count; ++i) {
+        const Mat3f& m = stretches[i];
+        if (!m.allFinite() || !((m - m.transpose()).norm() <= 1e-4f * m.norm()))
+            return "stretches[" + std::to_string(i) + "] must be symmetric and finite.";
+        const Mat3f above = m - Mat3f::Identity() / kMostGrowth, below = Mat3f::Identity() * kMostGrowth - m;
+        if (!is_positive(above) || !is_positive(below))
+            return "stretches[" + std::to_string(i) + "] must shrink and grow by no more than eight times.";
+    }
+    return "";
+}
+
+std::vector<RestStretch> rest_stretches(std::span<const Mat3f> stretches) {
+    std::vector<RestStretch> of;
+    for (const Mat3f& m : stretches) of.push_back({m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(0, 2), m(1, 2)});
+    return of;
+}
+
 Targets::Targets(std::size_t actor, Follow follow, const Vectors& positions, const Vectors& velocities, double spacing)
     : leash_pull(squared_rate(follow.leash_frequency)), leash_damping(2 * kLeashDamping * std::sqrt(leash_pull)),
       most_acceleration(float(follow.most_acceleration)), jump(kJump * float(spacing)) {
@@ -96,10 +134,12 @@ Targets::Targets(std::size_t actor, Follow follow, const Vectors& positions, con
     }
 }
 
-void Targets::set(const Vectors& positions, const Vectors& velocities, const Vectors& accelerations) {
+void Targets::set(const Vectors& positions, const Vectors& velocities, const Vectors& accelerations,
+                  std::vector<RestStretch> stretches) {
     memory.to = positions;
     memory.to_velocities = velocities;
     memory.accelerations = accelerations;
+    memory.to_stretches = std::move(stretches);
     memory.is_set = 1;
 }
 
@@ -108,19 +148,22 @@ bool Targets::takes(const TargetsMemory& saved) const {
     const std::size_t felt = saved.accelerations.size();
     return saved.actor == memory.actor && saved.is_set <= 1 && saved.from.size() == count &&
            saved.from_velocities.size() == count && saved.to.size() == end && saved.to_velocities.size() == end &&
-           (felt == 0 || felt == end) && is_finite(saved.from) && is_finite(saved.from_velocities) &&
-           is_finite(saved.to) && is_finite(saved.to_velocities) && is_finite(saved.accelerations);
+           (felt == 0 || felt == end) && is_sound(saved.from_stretches, count) && is_sound(saved.to_stretches, end) &&
+           is_finite(saved.from) && is_finite(saved.from_velocities) && is_finite(saved.to) &&
+           is_finite(saved.to_velocities) && is_finite(saved.accelerations);
 }
 
 void Targets::end_frame() {
     memory.from = std::move(memory.to);
     memory.from_velocities = std::move(memory.to_velocities);
+    memory.from_stretches = std::move(memory.to_stretches);
     memory.to = memory.to_velocities = memory.accelerations = {};
+    memory.to_stretches = {};
     memory.is_set = 0;
 }
 
 Vectors Targets::begin_frame(float seconds) {
-    if (!memory.is_set) set(memory.from, Vectors(memory.from.size()), {});
+    if (!memory.is_set) set(memory.from, Vectors(memory.from.size()), {}, memory.from_stretches);
     const std::size_t count = memory.from.size();
     course = {Vectors(count), Vectors(count), memory.accelerations};
     Vectors jumps(count);
@@ -165,6 +208,7 @@ void release_targets(SimulationState& state, BodyState& body) {
     if (found == state.targets.end()) return;
     body.follows = false;
     body.elasticity->set_crush_share(1);
+    body.elasticity->set_rest_stretches({}, {});
     for (const Index i : found->held) {
         body.fixed[i] = 0;
         body.inverse_mass[i] = 1 / body.body->mass[i];
@@ -183,6 +227,7 @@ void follow_jumps(SimulationState& state) {
         const std::size_t slot = state.slot_of[targets.memory.actor];
         BodyState& body = state.bodies[slot];
         const Vectors jumps = targets.begin_frame(float(state.frame_seconds()));
+        body.elasticity->set_rest_stretches(targets.memory.from_stretches, targets.memory.to_stretches);
         if (jumps.size() == 0) continue;
         for (std::size_t i = 0; i < jumps.size(); ++i) body.positions.add(i, jumps[i]);
         if (body.corners) body.corners->place(body.positions, body.velocities, RunContext(1));
@@ -250,6 +295,7 @@ void hold_on_targets(SimulationState& state, double now) {
         BodyState& body = state.body_of(targets.memory.actor);
         const TargetsMemory& m = targets.memory;
         const Targets::Course& course = targets.course;
+        body.elasticity->set_part_of_frame(float(state.part_of_frame(now)));
         for (const Index i : targets.held) {
             const Vec3f from = m.from[i], to = m.to[i], u = course.from_velocities[i], v = course.to_velocities[i];
             body.positions.set(i, w.from * from + w.to * to + w.from_velocity * u + w.to_velocity * v);

@@ -13,16 +13,18 @@ namespace filigree {
 /// The targets at the start and at the end of the frame that comes.
 struct TargetsMemory {
     std::uint64_t actor = 0;
-    std::uint64_t is_set = 0;                         ///< 1: the end is known; else the targets stop at `from`
-    Vectors from, from_velocities, to, to_velocities; ///< m, m/s
-    Vectors accelerations;                            ///< m/s^2 that are felt on the way; or empty
+    std::uint64_t is_set = 0;                              ///< 1: the end is known; else the targets stop at `from`
+    Vectors from, from_velocities, to, to_velocities;      ///< m, m/s
+    Vectors accelerations;                                 ///< m/s^2 that are felt on the way; or empty
+    std::vector<RestStretch> from_stretches, to_stretches; ///< of the rest shape; empty: as the body is
 };
 
 struct Targets {
     /// positions and velocities: now. spacing: the body's, m.
     Targets(std::size_t actor, Follow follow, const Vectors& positions, const Vectors& velocities, double spacing);
 
-    void set(const Vectors& positions, const Vectors& velocities, const Vectors& accelerations);
+    void set(const Vectors& positions, const Vectors& velocities, const Vectors& accelerations,
+             std::vector<RestStretch> stretches);
     /// Whether a saved memory is of these targets, and sound.
     bool takes(const TargetsMemory& saved) const;
     void end_frame();
@@ -56,6 +58,8 @@ struct Targets {
 
 /// The first thing wrong, as a sentence, or "". count: particles of the body.
 std::string check_follow(const Follow& follow, std::size_t count);
+std::string check_stretches(std::span<const Mat3f> stretches, std::size_t count);
+std::vector<RestStretch> rest_stretches(std::span<const Mat3f> stretches);
 
 struct SimulationState;
 /// Lets go of particles that are held on targets; those that are pinned stay pinned.
