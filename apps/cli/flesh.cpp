@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fmt/ranges.h>
 #include <numeric>
 
 #include <fmt/format.h>
@@ -257,6 +258,14 @@ private:
             poses.frames.assign(begin, begin + std::ptrdiff_t(clips_[c].frames.size()));
             first += clips_[c].frames.size();
             if (clips_[c].is_loop && !(flesh_gap(c) > 0)) poses.frames.back() = poses.frames.front();
+        if (!made.scaled.empty()) {
+            constexpr std::size_t kMostNames = 4;
+            const std::size_t named = std::min(made.scaled.size(), kMostNames);
+            std::string names = fmt::format("'{}'", fmt::join(std::span(made.scaled).first(named), "', '"));
+            if (made.scaled.size() > named) names += fmt::format(" and {} more", made.scaled.size() - named);
+            report_.row("grows", "with the joints that change their size or stretch: " + names);
+        }
+        report_.set("scaled", made.scaled);
         }
     }
 
@@ -398,7 +407,7 @@ private:
             if (m.overlap > kMuchOverlap && m.overlap > m.skin_overlap)
                 session_.warn(of + "parts of the body overlap more than in the skin; take more --particles, or a "
                                    "larger --core.");
-            if (m.is_closed && m.least_volume < kMuchVolumeLost)
+            if (m.is_closed && m.least_volume < kMuchVolumeLost && flesh_.report().scaled.empty())
                 session_.warn(fmt::format("{}the body loses {:.0f} % of its volume; a smaller --core lets the joints "
                                           "keep it.",
                                           of, 100 * (1 - m.least_volume)));

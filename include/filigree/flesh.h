@@ -111,7 +111,7 @@ struct FleshReport {
     std::size_t held = 0;              ///< particles on the skin
     std::size_t thin = 0;              ///< particles of thin parts, which follow as a whole
     std::size_t left_out_vertices = 0; ///< vertices that follow their joints as before and have no flesh
-    std::vector<std::string> scaled;   ///< joints that change their size: what they move is held
+    std::vector<std::string> scaled;   ///< joints that change their size or stretch: what they move grows with them
     std::vector<std::string> left_out; ///< joints that are mirrored, or scaled beyond 1/2 and 2
     std::vector<std::string> soft;     ///< joints that SoftJoints name
     std::vector<std::string> warnings; ///< sentences
@@ -140,13 +140,18 @@ public:
     /// The faces that have flesh, as a mesh over all vertices.
     const Mesh& surface() const { return surface_; }
 
-    /// Where the joints want the particles: by dual quaternions [Kavan 2007]; linear where joints are scaled. In metres
-    /// relative to the mesh's origin, less `offset`. transforms: of SkinnedMesh::transforms. accelerations: if given,
-    /// what Simulation::set_targets takes: what undoes gravity in the bind pose. Cost O(particles).
+    /// Where the joints want the particles: by dual quaternions [Kavan 2007], of matter that has grown with the joints;
+    /// linear where these are patches. In metres relative to the mesh's origin, less `offset`. transforms: of
+    /// SkinnedMesh::transforms. accelerations: if given, what Simulation::set_targets takes: what undoes gravity in the
+    /// bind pose. Cost O(particles).
     void targets(std::span<const Eigen::Affine3d> transforms, const Vec3d& offset, Vectors& positions,
                  Vectors* accelerations, const RunContext& context = RunContext()) const;
     /// Targets, with the cells that the joints crush there open again as far as what is held lets them: where a
     /// simulation starts, as crushed cells would fly apart. Cost: 60 passes over those cells.
+    /// The rest shape of the matter where joints change their size or stretch, one matrix a particle, as
+    /// Simulation::set_targets takes it; empty where none does.
+    std::vector<Mat3f> stretches(std::span<const Eigen::Affine3d> transforms,
+                                 const RunContext& context = RunContext()) const;
     Vectors settled(const Vectors& targets) const;
 
 private:
@@ -159,7 +164,7 @@ private:
     FleshReport report_;
     std::vector<float> softness_;
     std::vector<FleshWeights> weights_;
-    std::vector<std::uint8_t> linear_; ///< of each particle: 1 where joints are scaled, or are patches
+    std::vector<std::uint8_t> grows_; ///< of joints that change their size or stretch; empty: none does
     std::vector<std::uint8_t> left_out_;
     Mesh surface_;
 };

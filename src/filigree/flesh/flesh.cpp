@@ -22,7 +22,6 @@ constexpr std::size_t kTargetsGrain = 512; // particles
 constexpr double kKeepsScale = 0.05;       ///< joints that change their size by less are rigid
 constexpr double kLeastScale = 0.5, kMostScale = 2;
 constexpr float kCarries = 0.15f;              ///< weight from which a bone is near to a particle
-constexpr float kScaledShare = 0.25f;          ///< weight of joints that change their size
 constexpr float kHeldStrength = 0.75f;         ///< of joints that hold their core
 constexpr float kFreeStrength = 0.1f;          ///< of joints that have no leash
 constexpr double kLeafReach = 1.5;             ///< times the way from a last joint to the middle of what it carries
@@ -55,6 +54,15 @@ std::string list_of(const std::vector<std::string>& names) {
     std::string list;
     for (std::size_t n = 0; n < std::min(names.size(), kMost); ++n) list += (n > 0 ? ", '" : "'") + names[n] + "'";
     return names.size() > kMost ? list + " and " + std::to_string(names.size() - kMost) + " more" : list;
+}
+
+/// S of a transform R S, R a rotation: what it does to sizes, a symmetric matrix. Singular values stay within the
+/// range of joints that flesh follows, also between the moments that were looked at.
+Mat3d stretch_of(const Eigen::Affine3d& transform) {
+    const SingularValues<double> parts = singular_values(Mat3d(transform.linear()));
+    const Vec3d s = parts.s.cwiseMax(kLeastScale / 2).cwiseMin(2 * kMostScale);
+    const Mat3d stretch = parts.v * s.asDiagonal() * parts.v.transpose();
+    return 0.5 * (stretch + stretch.transpose());
 }
 
 } // namespace
@@ -216,7 +224,6 @@ private:
     /// Which joints change their size in the clips, and which are no motion that flesh can follow.
     void find_scales() {
         const std::size_t count = skin().joints.size();
-        is_scaled_.assign(count, 0);
         is_odd_.assign(count, 0);
         if (!skin().has_bones) return; // patches stretch as their surface does
         std::vector<double> least(count, 1), most(count, 1);
@@ -232,16 +239,18 @@ private:
                 }
             });
         }
+        std::vector<std::uint8_t> grows(count);
         std::vector<double> carried(count);
         for (std::size_t i = 0; i < skin().weights.joints.size(); ++i)
             carried[skin().weights.joints[i]] += double(skin().weights.weights[i]);
         for (std::size_t j = 0; j < count; ++j) {
             if (!(carried[j] > 0) || skin().joints[j].is_node_of_mesh) continue;
             is_odd_[j] = least[j] < kLeastScale || most[j] > kMostScale;
-            is_scaled_[j] = !is_odd_[j] && (least[j] < 1 - kKeepsScale || most[j] > 1 + kKeepsScale);
-            if (is_scaled_[j]) flesh_.report_.scaled.push_back(skin().joints[j].name);
+            grows[j] = !is_odd_[j] && (least[j] < 1 - kKeepsScale || most[j] > 1 + kKeepsScale);
+            if (grows[j]) flesh_.report_.scaled.push_back(skin().joints[j].name);
             if (is_odd_[j]) flesh_.report_.left_out.push_back(skin().joints[j].name);
         }
+        if (!flesh_.report_.scaled.empty()) flesh_.grows_ = std::move(grows);
     }
 
     /// Leaves out faces of meshes without a skin, and those that odd joints carry.
@@ -276,8 +285,7 @@ private:
                              ? std::string("No face hangs on a joint of a skin.")
                              : "All faces hang on joints that are mirrored, or that clips scale beyond 1/2 and 2 (" +
                                    list_of(flesh_.report_.left_out) +
-                                   "); flesh keeps its size. Choose other clips, or take the scale out of "
-                                   "them."};
+                                   "). Choose other clips, or take the scale out of them."};
         return Success{};
     }
 
@@ -386,7 +394,6 @@ private:
 
     /// How far the joints alone crush each cell in the clips: a bone that holds a crushed cell turns it inside out.
     void find_folds() {
-        flesh_.linear_.assign(body().particle_count(), !skin().has_bones);
         least_volume_.assign(body().particle_count(), 1);
         std::vector<Eigen::Affine3d> transforms(skin().joints.size());
         const auto& cells = body().cells.cell_corners;
@@ -397,13 +404,17 @@ private:
             each_moment(clip, [&](double seconds) {
                 skin().transforms(clip, seconds, transforms);
                 flesh_.targets(transforms, Vec3d::Zero(), at, nullptr, context_);
+                const std::vector<Mat3f> stretches = flesh_.stretches(transforms, context_);
                 parallel_for(context_, cells.size(), kTargetsGrain, [&](std::size_t begin, std::size_t end) {
                     for (std::size_t c = begin; c < end; ++c) {
                         Mat3f gradient = Mat3f::Zero();
+                        float grown = stretches.empty() ? 1 : 0; // volume of the rest shape
                         for (int corner = 0; corner < 8; ++corner)
                             for (int axis = 0; axis < 3; ++axis)
                                 gradient.col(axis) += (corner >> axis & 1 ? 0.25f : -0.25f) * at[cells[c][corner]];
-                        of_cell[c] = std::min(of_cell[c], (inverse * gradient).determinant());
+                        for (std::size_t corner = 0; corner < 8 && !stretches.empty(); ++corner)
+                            grown += 0.125f * stretches[cells[c][corner]].determinant();
+                        of_cell[c] = std::min(of_cell[c], (inverse * gradient).determinant() / grown);
                     }
                 });
             });
@@ -428,11 +439,10 @@ private:
         follow.most_acceleration = o.most_acceleration;
         for (std::size_t i = 0; i < count; ++i) {
             const FleshWeights& of = flesh_.weights_[i];
-            float strength = 0, scaled = 0;
+            float strength = 0;
             double core = o.core, edge = o.frequency, surface = o.surface_frequency, damping = o.damping;
             for (std::size_t k = 0; k < FleshWeights::kMost; ++k) {
                 const Index joint = of.joints[k];
-                scaled += of.weights[k] * float(is_scaled_[joint]);
                 if (soft_of_[joint] == o.soft.size()) {
                     strength += of.weights[k];
                     continue;
@@ -447,10 +457,8 @@ private:
             }
             if (!loose_.empty()) strength *= 1 - loose_[i] * (1 - float(o.loose_strength));
             const double u = double(flesh_.softness_[i]);
-            const bool is_stiff = scaled > kScaledShare;
-            if (is_stiff) flesh_.linear_[i] = 1;
             const float whole = std::clamp((least_volume_[i] - kFolded) / (kWhole - kFolded), 0.0f, 1.0f);
-            const bool is_held = is_stiff || (u < core && strength > kHeldStrength && whole >= 1) || core >= 1;
+            const bool is_held = (u < core && strength > kHeldStrength && whole >= 1) || core >= 1;
             const double out = std::clamp((1 - u) / std::max(1 - core, 1e-9), 0.0, 1.0);
             double frequency = surface + (edge - surface) * out * std::sqrt(out);
             if (is_thin_[i]) frequency = std::max(frequency, edge);
@@ -465,12 +473,7 @@ private:
             flesh_.report_.thin += is_thin_[i];
         }
         if (flesh_.report_.held == count)
-            return Error{ErrorCode::unsuitable,
-                         flesh_.report_.scaled.empty()
-                             ? std::string("Everything is held by the core; choose a smaller one.")
-                             : "All of it hangs on joints that change their size or stretch (" +
-                                   list_of(flesh_.report_.scaled) +
-                                   "), and flesh does not; apply the scale to the mesh, or take it out of the clips."};
+            return Error{ErrorCode::unsuitable, "Everything is held by the core; choose a smaller one."};
         return Success{};
     }
 
@@ -526,8 +529,8 @@ private:
             warnings.push_back("Joints that are mirrored or scaled beyond 1/2 and 2 carry their vertices as before, "
                                "without flesh: " +
                                list_of(report.left_out) + ".");
-        if (!report.scaled.empty())
-            warnings.push_back("Joints that change their size hold what they carry, which is not soft: " +
+        if (!report.scaled.empty() && body().material.is_plastic())
+            warnings.push_back("Flesh that yields does not grow with its joints; it is drawn after them: " +
                                list_of(report.scaled) + ".");
         const auto thin = double(report.thin) / double(body().particle_count());
         if (thin > 0.5)
@@ -542,7 +545,6 @@ private:
     std::vector<std::size_t> soft_of_;    ///< of joints: number in FleshOptions::soft, or behind its end
     std::vector<std::uint16_t> group_of_; ///< of joints, for contact; empty: everything touches
     std::vector<float> loose_;            ///< of particles; empty: none is
-    std::vector<std::uint8_t> is_scaled_; ///< of joints
     std::vector<std::uint8_t> is_odd_;    ///< of joints
     std::vector<std::array<Index, 6>> neighbours_;
     std::vector<std::uint8_t> is_thin_; ///< of particles
@@ -559,18 +561,22 @@ void Flesh::targets(std::span<const Eigen::Affine3d> transforms, const Vec3d& of
     struct Joint {
         Eigen::Vector4d real, dual; ///< x, y, z, w
         Eigen::Affine3d whole;      ///< m
+        Vec3d place;                ///< m, in the bind pose
+        Mat3d growth;               ///< what the rest shape gains there, about the joint
     };
     std::vector<Joint> joints(transforms.size());
     for (std::size_t j = 0; j < joints.size(); ++j) {
         const Mat3d turn = nearest_rotation(transforms[j].linear());
         const Eigen::Quaterniond q(turn);
-        const Vec3d place = skin_->joints[j].place; // where a joint that changes its size stays in its place
+        const Vec3d place = skin_->joints[j].place; // where a joint that changes its size stays
         const Vec3d shift = scale() * (transforms[j] * place - turn * place) - offset;
         const Eigen::Quaterniond half(0, 0.5 * shift.x(), 0.5 * shift.y(), 0.5 * shift.z());
         joints[j].real = q.coeffs();
         joints[j].dual = (half * q).coeffs();
         joints[j].whole = transforms[j];
         joints[j].whole.translation() = scale() * transforms[j].translation() - offset;
+        joints[j].place = scale() * place;
+        if (!grows_.empty() && grows_[j]) joints[j].growth = stretch_of(transforms[j]) - Mat3d::Identity();
     }
     const std::size_t count = body_->particle_count();
     if (positions.size() != count) positions = Vectors(count);
@@ -580,6 +586,7 @@ void Flesh::targets(std::span<const Eigen::Affine3d> transforms, const Vec3d& of
         for (std::size_t i = begin; i < end; ++i) {
             const FleshWeights& of = weights_[i];
             const Vec3d rest = body_->rest[i].cast<double>();
+            Vec3d grown = rest;
             Eigen::Vector4d real = Eigen::Vector4d::Zero(), dual = Eigen::Vector4d::Zero();
             const Eigen::Vector4d& first = joints[of.joints[0]].real;
             for (std::size_t k = 0; k < FleshWeights::kMost && of.weights[k] > 0; ++k) {
@@ -587,14 +594,16 @@ void Flesh::targets(std::span<const Eigen::Affine3d> transforms, const Vec3d& of
                 const double weight = joint.real.dot(first) < 0 ? -double(of.weights[k]) : double(of.weights[k]);
                 real += weight * joint.real;
                 dual += weight * joint.dual;
+                if (!grows_.empty() && grows_[of.joints[k]])
+                    grown += double(of.weights[k]) * (joint.growth * (rest - joint.place));
             }
             const double inverse = 1 / std::max(real.norm(), 1e-12);
             real *= inverse;
             dual *= inverse;
             const Vec3d r = real.head<3>(), d = dual.head<3>();
             const auto turned = [&](const Vec3d& v) -> Vec3d { return v + 2 * r.cross(r.cross(v) + real[3] * v); };
-            Vec3d place = turned(rest) + 2 * (real[3] * d - dual[3] * r + r.cross(d));
-            if (linear_[i]) {
+            Vec3d place = turned(grown) + 2 * (real[3] * d - dual[3] * r + r.cross(d));
+            if (!skin_->has_bones) {
                 place.setZero();
                 for (std::size_t k = 0; k < FleshWeights::kMost && of.weights[k] > 0; ++k)
                     place += double(of.weights[k]) * (joints[of.joints[k]].whole * rest);
@@ -603,6 +612,23 @@ void Flesh::targets(std::span<const Eigen::Affine3d> transforms, const Vec3d& of
             if (accelerations) accelerations->set(i, turned(undone).cast<float>());
         }
     });
+}
+
+std::vector<Mat3f> Flesh::stretches(std::span<const Eigen::Affine3d> transforms, const RunContext& context) const {
+    if (grows_.empty()) return {};
+    std::vector<Mat3f> of_joints(transforms.size(), Mat3f::Identity());
+    for (std::size_t j = 0; j < of_joints.size(); ++j)
+        if (grows_[j]) of_joints[j] = stretch_of(transforms[j]).cast<float>();
+    std::vector<Mat3f> stretches(body_->particle_count());
+    parallel_for(context, stretches.size(), kTargetsGrain, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            Mat3f sum = Mat3f::Zero();
+            for (std::size_t k = 0; k < FleshWeights::kMost; ++k)
+                sum += weights_[i].weights[k] * of_joints[weights_[i].joints[k]];
+            stretches[i] = sum;
+        }
+    });
+    return stretches;
 }
 
 Vectors Flesh::settled(const Vectors& targets) const {

@@ -29,7 +29,8 @@ public:
     ClipTargets(const Flesh& flesh, std::size_t clip, double rate, long last, bool loops, const Vec3d& offset,
                 const RunContext& context)
         : flesh_(flesh), context_(context), clip_(clip), rate_(rate), last_(last), loops_(loops), offset_(offset),
-          seconds_(flesh.skin().clips[clip].seconds), transforms_(flesh.skin().joints.size()) {}
+          seconds_(flesh.skin().clips[clip].seconds), transforms_(flesh.skin().joints.size()),
+          grows_(!flesh.body()->material.is_plastic()) {}
 
     /// 0 .. last.
     const Vectors& at(long frame) {
@@ -54,6 +55,12 @@ public:
         Vectors unused;
         flesh_.targets(transforms_, offset_, unused, &felt, context_);
         return felt;
+    }
+
+    /// Of the rest shape; empty where no joint changes its size.
+    std::vector<Mat3f> stretches(long frame) {
+        set_transforms(frame);
+        return grows_ ? flesh_.stretches(transforms_, context_) : std::vector<Mat3f>();
     }
 
 private:
@@ -84,6 +91,7 @@ private:
     Vec3d offset_;
     double seconds_;
     std::vector<Eigen::Affine3d> transforms_;
+    bool grows_;
     std::array<Kept, 6> kept_;
     std::size_t next_ = 0;
 };
@@ -185,7 +193,7 @@ private:
         if (Status set = simulation_->set_positions(0, positions); !set) return set;
         if (at_skin)
             if (Status set = simulation_->set_velocities(0, velocities); !set) return set;
-        return simulation_->set_follow(0, flesh_.follow(), start, velocities);
+        return simulation_->set_follow(0, flesh_.follow(), start, velocities, targets_->stretches(0));
     }
 
     /// From the last frame of a cycle to the first of the next: as the joints go there, in no time.
@@ -200,7 +208,7 @@ private:
                 moves = true;
             }
         if (moves) return begin(again, false);
-        return simulation_->set_follow(0, flesh_.follow(), first, targets_->velocities(0));
+        return simulation_->set_follow(0, flesh_.follow(), first, targets_->velocities(0), targets_->stretches(0));
     }
 
     Status one_cycle(unsigned cycle, unsigned most) {
@@ -212,8 +220,9 @@ private:
             const double start = now_seconds();
             const Vectors at = targets_->at(frame), velocities = targets_->velocities(frame),
                           felt = targets_->accelerations(frame);
+            const std::vector<Mat3f> stretches = targets_->stretches(frame);
             const double middle = now_seconds();
-            if (Status set = simulation_->set_targets(0, at, velocities, felt); !set) return set;
+            if (Status set = simulation_->set_targets(0, at, velocities, felt, stretches); !set) return set;
             const Result<FrameReport> report = simulation_->advance(silent());
             if (!report) return report.error();
             made_.target_seconds += middle - start;

@@ -34,18 +34,25 @@ Vectors Following::velocities(double frame, const Vectors& now) {
     return target_velocities(targets(frame - 1, nullptr), now, targets(frame + 1, nullptr), rate_);
 }
 
+/// The rest shape, which does not turn with the placement.
+std::vector<Mat3f> Following::stretches(double frame) {
+    if (flesh_.body()->material.is_plastic()) return {};
+    set_transforms(frame);
+    return flesh_.stretches(transforms_, context_);
+}
+
 Status Following::begin(Simulation& simulation) {
     const Vectors start = targets(0, nullptr), speeds = velocities(0, start);
     if (Status set = simulation.set_positions(number_, flesh_.settled(start)); !set) return set;
     if (Status set = simulation.set_velocities(number_, speeds); !set) return set;
-    return simulation.set_follow(number_, flesh_.follow(), start, speeds);
+    return simulation.set_follow(number_, flesh_.follow(), start, speeds, stretches(0));
 }
 
 Status Following::next(Simulation& simulation) {
     const auto frame = double(simulation.frame() + 1);
     Vectors felt;
     const Vectors at = targets(frame, body_.follow->is_sculpted ? &felt : nullptr);
-    return simulation.set_targets(number_, at, velocities(frame, at), felt);
+    return simulation.set_targets(number_, at, velocities(frame, at), felt, stretches(frame));
 }
 
 void Following::carry_left_out(std::size_t frame, std::span<const Index> vertices, std::span<Vec3f> positions,

@@ -29,6 +29,7 @@ private:
     void set_transforms(double frame);
     Vectors targets(double frame, Vectors* felt);
     Vectors velocities(double frame, const Vectors& now);
+    std::vector<Mat3f> stretches(double frame);
 
     const ReadyBody& body_;
     const Flesh& flesh_;
