@@ -2,21 +2,18 @@
 #include "commands.h"
 #include "moving_input.h"
 
-#include "filigree/fit.h"
 #include "filigree/flesh.h"
 #include "filigree/flesh/skin_map.h"
 #include "filigree/io/system/extension.h"
 #include "filigree/io/system/numbered_name.h"
 #include "filigree/mesh/mesh_map.h"
-#include "filigree/mesh/weld.h"
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fmt/ranges.h>
-#include <numeric>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace filigree::cli {
 
@@ -31,7 +28,6 @@ constexpr double kRestlessLoop = 5e-3; // of the diagonal
 constexpr double kAlreadyLoops = 0.01; // of the diagonal
 constexpr double kMuchVolumeLost = 0.95;
 constexpr std::size_t kOverlapFrames = 4;
-constexpr std::size_t kFewestPlaces = 12; // FitOptions::base
 
 struct FleshArguments {
     std::string input, mesh;
@@ -110,26 +106,6 @@ std::vector<std::size_t> chosen_clips(const FleshArguments& options, const Skinn
     return chosen;
 }
 
-/// A driver has no more vertices than there are places.
-std::size_t places_of_faces(const Mesh& mesh) {
-    const std::vector<Index> first = weld_map(mesh.positions);
-    std::vector<std::uint8_t> is_used(mesh.vertex_count());
-    for (const Index v : mesh.corners) is_used[first[v]] = 1;
-    return std::size_t(std::ranges::count(is_used, 1));
-}
-
-/// Clips of one name get numbers.
-std::vector<std::string> names_of(const std::vector<FleshClip>& clips) {
-    std::vector<std::string> names;
-    for (const FleshClip& clip : clips) {
-        std::string name = clip.name;
-        for (int number = 2; std::ranges::find(names, name) != names.end(); ++number)
-            name = fmt::format("{} {}", clip.name, number);
-        names.push_back(std::move(name));
-    }
-    return names;
-}
-
 class FleshCommand {
 public:
     FleshCommand(const FleshArguments& options, Session& session)
@@ -142,9 +118,8 @@ public:
             measures_.push_back(require(
                 measure_flesh(flesh_, clips_.back(), options_.no_check ? 0 : kOverlapFrames, session_.context())));
         }
-        names_ = names_of(clips_);
         const double simulated = now_seconds();
-        fit();
+        fitted_ = require(of_input(fit_flesh(flesh_, clips_, options_.joints, session_.context())));
         report_flesh();
         for (std::size_t c = 0; c < clips_.size(); ++c) report_clip(c);
         write();
@@ -209,10 +184,16 @@ private:
         const std::string extension = lower_extension(path_of(options_.input));
         if (!character.rest && (extension == ".pc2" || extension == ".mdd" || extension == ".usda"))
             refuse(options_.input + ": has positions alone; --mesh FILE gives the mesh that it moves.");
-        Result<SkinnedMesh> skin = read_character(path_of(options_.input), character, session_.context());
-        if (!skin && skin.error().code == ErrorCode::unsuitable && !skin.error().message.starts_with(options_.input))
-            throw Failure{{skin.error().code, options_.input + ": " + skin.error().message}};
-        return require(std::move(skin));
+        return require(of_input(read_character(path_of(options_.input), character, session_.context())));
+    }
+
+    /// Says which file it is that does not suit.
+    template <class T>
+    Result<T> of_input(Result<T> result) const {
+        if (!result && result.error().code == ErrorCode::unsuitable &&
+            !result.error().message.starts_with(options_.input))
+            return Error{result.error().code, options_.input + ": " + result.error().message};
+        return result;
     }
 
     FleshClipOptions clip_options() const {
@@ -221,80 +202,25 @@ private:
         return options;
     }
 
-    /// The frames of all clips, one behind the other.
-    std::pair<std::size_t, std::size_t> clip_and_frame(std::size_t frame) const {
-        std::size_t clip = 0;
-        while (frame >= clips_[clip].frames.size()) frame -= clips_[clip++].frames.size();
-        return {clip, frame};
-    }
-
-    /// As few joints as were asked for, that follow the flesh best.
-    void fit() {
-        const Mesh& mesh = flesh_.skin().mesh;
-        std::vector<Index> all(mesh.vertex_count());
-        std::iota(all.begin(), all.end(), Index{0});
-        FleshCarrier carrier = require(FleshCarrier::create(flesh_, all, session_.silent_context()));
-        const RunContext silent = session_.silent_context();
-        MeshAnimation animation{.rest = &mesh, .positions = {}};
-        for (const FleshClip& clip : clips_) animation.frames += clip.frames.size();
-        animation.positions = [&](std::size_t frame, std::span<Vec3f> positions) -> Status {
-            const auto [clip, of_clip] = clip_and_frame(frame);
-            carrier.at(clips_[clip], of_clip, positions, {}, silent);
-            return Success{};
-        };
-        const std::size_t places = places_of_faces(mesh), most = std::min(options_.joints, places);
-        if (places < kFewestPlaces)
-            refuse(
-                ErrorCode::unsuitable,
-                fmt::format("{}: has {} vertices at different places, and {} are the fewest that flesh is fitted to; "
-                            "subdivide the mesh.",
-                            options_.input, places, kFewestPlaces));
-        fitted_ = require(fit_animation(animation, {.base = most}, session_.context()));
-        std::size_t first = 0;
-        for (std::size_t c = 0; c < clips_.size(); ++c) {
-            PoseSequence& poses = poses_.emplace_back();
-            poses.frames_per_second = clips_[c].frames_per_second;
-            const auto begin = fitted_.poses.frames.begin() + std::ptrdiff_t(first);
-            poses.frames.assign(begin, begin + std::ptrdiff_t(clips_[c].frames.size()));
-            first += clips_[c].frames.size();
-            if (clips_[c].is_loop && !(flesh_gap(c) > 0)) poses.frames.back() = poses.frames.front();
-        if (!made.scaled.empty()) {
-            constexpr std::size_t kMostNames = 4;
-            const std::size_t named = std::min(made.scaled.size(), kMostNames);
-            std::string names = fmt::format("'{}'", fmt::join(std::span(made.scaled).first(named), "', '"));
-            if (made.scaled.size() > named) names += fmt::format(" and {} more", made.scaled.size() - named);
-            report_.row("grows", "with the joints that change their size or stretch: " + names);
-        }
-        report_.set("scaled", made.scaled);
-        }
-    }
-
-    /// m: how far the last frame is from the first.
-    double flesh_gap(std::size_t c) const {
-        const Vectors &first = clips_[c].frames.front(), &last = clips_[c].frames.back();
-        double most = 0;
-        for (std::size_t i = 0; i < first.size(); ++i) most = std::max(most, double((first[i] - last[i]).norm()));
-        return most;
-    }
-
     void write() {
+        if (!fitted_.morphs.empty() && !std::ranges::all_of(options_.outputs, is_glb))
+            session_.warn("The file's morph targets are in a .glb alone; elsewhere the mesh stays as they have it at "
+                          "rest. --by-surface moves it with them.");
         for (const std::string& path : options_.outputs) {
             if (is_fil(path)) {
-                session_.write_model(fitted_.model, path, poses_[0]);
+                session_.write_model(fitted_.model, path, fitted_.poses[0]);
                 report_.row("file", path);
                 continue;
             }
             if (!is_glb(path)) {
                 Report of_file;
-                FrameSource<Pose> poses = frames_of(poses_[0]);
+                FrameSource<Pose> poses = frames_of(fitted_.poses[0]);
                 poses.metres_per_unit = flesh_.scale();
                 write_animation_output(fitted_.model, poses, {}, options_.animation, path, options_.input, session_,
                                        of_file);
                 report_.add_rows(of_file);
                 continue;
             }
-            std::vector<NamedPoses> named;
-            for (std::size_t c = 0; c < clips_.size(); ++c) named.push_back({names_[c], frames_of(poses_[c])});
             SkinOptions skin = options_.animation.skin;
             skin.normals = options_.animation.no_normals ? ExportNormals::leave : ExportNormals::keep;
             skin.compress = options_.animation.compress;
@@ -302,13 +228,13 @@ private:
             if (options_.keep_skeleton) skin.skeleton_of = path_of(options_.input);
             if (!skin.key_rate) skin.key_rate = kDefaultKeyRate;
             session_.begin_writing(path);
-            const ExportReport written =
-                require(write_skin_glb(fitted_.model, named, skin, path_of(path), session_.context()));
+            const ExportReport written = require(write_skin_glb(fitted_.model, fitted_.animations(), fitted_.morphs,
+                                                                skin, path_of(path), session_.context()));
             session_.warn(written.warnings);
             report_.add("file",
                         fmt::format("{}, {:.3g} MB: {} joints, {} clips, {} keys, error {:.1e} of the diagonal at them",
-                                    path, double(written.bytes) / 1e6, with_commas(written.joints), named.size(),
-                                    with_commas(written.keys), written.error_at_keys),
+                                    path, double(written.bytes) / 1e6, with_commas(written.joints),
+                                    fitted_.names.size(), with_commas(written.keys), written.error_at_keys),
                         "output", path);
             report_.set("bytes", written.bytes);
             report_.set("error_at_keys", written.error_at_keys);
@@ -332,6 +258,14 @@ private:
             report_.row("left out", fmt::format("{} of {} vertices follow their joints without flesh",
                                                 with_commas(made.left_out_vertices),
                                                 with_commas(flesh_.skin().mesh.vertex_count())));
+        if (!made.scaled.empty()) {
+            constexpr std::size_t kMostNames = 4;
+            const std::size_t named = std::min(made.scaled.size(), kMostNames);
+            std::string names = fmt::format("'{}'", fmt::join(std::span(made.scaled).first(named), "', '"));
+            if (made.scaled.size() > named) names += fmt::format(" and {} more", made.scaled.size() - named);
+            report_.row("grows", "with the joints that change their size or stretch: " + names);
+        }
+        report_.set("scaled", made.scaled);
         report_.set("spacing", body.spacing());
         report_.set("held", made.held);
         report_.set("left_out_vertices", made.left_out_vertices);
@@ -347,9 +281,9 @@ private:
         const FleshClip& clip = clips_[c];
         const FleshMeasure& m = measures_[c];
         const std::string& joint =
-            m.furthest_joint == kNoIndex ? names_[c] : flesh_.skin().joints[m.furthest_joint].name;
+            m.furthest_joint == kNoIndex ? fitted_.names[c] : flesh_.skin().joints[m.furthest_joint].name;
         report_.row("clip", fmt::format("'{}', {} frames at {:.4g} a second, {} a frame, {} substeps at most",
-                                        names_[c], clip.frames.size(), clip.frames_per_second,
+                                        fitted_.names[c], clip.frames.size(), clip.frames_per_second,
                                         seconds_text(clip.step_seconds + clip.target_seconds), clip.most_substeps));
         report_.row("  volume", fmt::format("{:.3f} .. {:.3f} of the bind pose's; the skin alone: {:.3f} .. {:.3f}",
                                             m.least_volume, m.most_volume, m.skin_least_volume, m.skin_most_volume));
@@ -363,7 +297,7 @@ private:
                                               "to none",
                                               clip.loop_rms, clip.loop_max, clip.cycles));
         Json of = Json::object();
-        of["name"] = names_[c];
+        of["name"] = fitted_.names[c];
         of["frames"] = clip.frames.size();
         of["frames_per_second"] = clip.frames_per_second;
         of["step_seconds"] = clip.step_seconds;
@@ -390,7 +324,7 @@ private:
         for (std::size_t c = 0; c < clips_.size(); ++c) {
             const FleshClip& clip = clips_[c];
             const FleshMeasure& m = measures_[c];
-            const std::string of = "Clip '" + names_[c] + "': ";
+            const std::string of = "Clip '" + fitted_.names[c] + "': ";
             if (!clip.is_loop && !options_.clip.loop && clip.skin_gap < kAlreadyLoops)
                 session_.warn(of + "it ends as it begins; with --loop its flesh does so too.");
             if (clip.is_loop && clip.skin_gap > kAlreadyLoops)
@@ -423,7 +357,7 @@ private:
             if (clips_[c].clamped_particles > 0 || clips_[c].unstable_substeps > 0)
                 throw Doubt{fmt::format("Clip '{}' cannot be trusted: the motion of {} particles was not finite, and "
                                         "{} substeps were too long; raise --frame-rate, or lower --stiffness.",
-                                        names_[c], clips_[c].clamped_particles, clips_[c].unstable_substeps)};
+                                        fitted_.names[c], clips_[c].clamped_particles, clips_[c].unstable_substeps)};
     }
 
     const FleshArguments& options_;
@@ -432,9 +366,7 @@ private:
     Flesh flesh_;
     std::vector<FleshClip> clips_;
     std::vector<FleshMeasure> measures_;
-    std::vector<std::string> names_;
-    Fitted fitted_;
-    std::vector<PoseSequence> poses_;
+    FittedFlesh fitted_;
     Report report_;
 };
 

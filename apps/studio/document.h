@@ -108,6 +108,16 @@ struct FittedMotion {
     std::optional<FleshedMotion> flesh = {};
 };
 
+/// All clips of a character as flesh: one model, and what became of each clip. Shared, and never changes.
+struct FleshedClips {
+    struct Clip {
+        std::shared_ptr<const MovingMesh> original; ///< plain skinning
+        std::shared_ptr<const FittedMotion> fitted;
+    };
+    FittedFlesh fitted;
+    std::vector<Clip> clips; ///< as those of `fitted`; the number in the file is original->clip
+};
+
 /// What a body did, for the driver. Frames are shared between the steps of the history, so a longer recording costs its
 /// new frames alone.
 struct Recording {
@@ -119,6 +129,7 @@ struct Recording {
     /// What the poses follow; null: nothing. As many frames.
     std::shared_ptr<const MovingMesh> original;
     std::shared_ptr<const FittedMotion> fitted; ///< how well they do; null, with an original: they do not yet, all rest
+    std::shared_ptr<const FleshedClips> clips;  ///< of which this is one; null: it stands alone
 
     bool has_poses() const { return !original || fitted; }
     std::shared_ptr<const Mesh> surface(std::size_t frame) const {

@@ -22,8 +22,10 @@ QString times_smaller(const Recording& recording) {
     return times >= 100 ? with_commas(std::size_t(times)) : number_text(times);
 }
 
-Status pack(const Model& model, const PoseSequence& poses, const MeshAnimation& animation, double error,
-            FittedMotion& fitted, const RunContext& context) {
+} // namespace
+
+Status pack_motion(const Model& model, const PoseSequence& poses, const MeshAnimation& animation, double error,
+                   FittedMotion& fitted, const RunContext& context) {
     context.report("packing", 0);
     const QTemporaryDir folder;
     const std::filesystem::path path = path_of(folder.filePath("fitted.fil").toStdString());
@@ -47,15 +49,13 @@ Status pack(const Model& model, const PoseSequence& poses, const MeshAnimation& 
     return Success{};
 }
 
-} // namespace
-
 Result<FittedMotion> fit_to(const MeshAnimation& animation, const FitOptions& options, double packed_error,
                             State& state, const RunContext& context) {
     Result<Fitted> made = fit_animation(animation, options, context);
     if (!made) return made.error();
     FittedMotion fitted;
     fitted.report = made->report;
-    if (const Status packed = pack(made->model, made->poses, animation, packed_error, fitted, context); !packed)
+    if (const Status packed = pack_motion(made->model, made->poses, animation, packed_error, fitted, context); !packed)
         return packed.error();
     auto recording = std::make_shared<Recording>();
     recording->frames_per_second = animation.frames_per_second;

@@ -15,6 +15,10 @@ Result<State> fitted_state(State state, double error, const RunContext& context)
 Result<FittedMotion> fit_to(const MeshAnimation& animation, const FitOptions& options, double packed_error,
                             State& state, const RunContext& context);
 
+/// Packs a model with its poses, and measures it against the animation that they follow. Errors: those of pack_model.
+Status pack_motion(const Model& model, const PoseSequence& poses, const MeshAnimation& animation, double error,
+                   FittedMotion& fitted, const RunContext& context);
+
 /// Of a recording that is fitted: a sentence, and rows of names and values (rich text).
 QString fit_summary(const Recording& recording);
 QString fit_table(const Recording& recording);

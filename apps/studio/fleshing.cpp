@@ -54,55 +54,105 @@ FleshedMotion motion_of(const Flesh& flesh, const FleshClip& clip, const FleshMe
 
 } // namespace
 
+std::shared_ptr<const Recording> recording_of_clip(const std::shared_ptr<const FleshedClips>& clips,
+                                                   std::size_t number) {
+    const auto found = std::ranges::find(clips->clips, number, [](const auto& clip) { return clip.original->clip; });
+    if (found == clips->clips.end()) return nullptr;
+    const PoseSequence& poses = clips->fitted.poses[std::size_t(found - clips->clips.begin())];
+    auto recording = std::make_shared<Recording>();
+    recording->frames_per_second = poses.frames_per_second;
+    for (const Pose& pose : poses.frames) recording->frames.emplace_back(clips, &pose); // lives as long as the clips
+    recording->original = found->original;
+    recording->fitted = found->fitted;
+    recording->clips = clips;
+    return recording;
+}
+
+namespace {
+
+Result<std::vector<FleshClip>> simulated_clips(const Flesh& flesh, const std::vector<std::size_t>& numbers,
+                                               const FleshSettings& settings, const RunContext& context) {
+    FleshClipOptions how;
+    how.loop = settings.loop;
+    how.ground = settings.ground;
+    std::vector<FleshClip> clips;
+    for (const std::size_t number : numbers) {
+        Result<FleshClip> clip = simulate_flesh(flesh, number, how, context);
+        if (!clip) return clip.error();
+        clips.push_back(std::move(*clip));
+    }
+    return clips;
+}
+
+Result<FleshedClips::Clip> fleshed_clip(const Flesh& flesh, const FleshClip& clip, const FittedFlesh& fitted,
+                                        const PoseSequence& poses, const MovingMesh& before,
+                                        const RunContext& context) {
+    context.report("measuring the flesh", 0);
+    const Result<FleshMeasure> measure = measure_flesh(flesh, clip, 0, context);
+    if (!measure) return measure.error();
+    const Mesh& mesh = flesh.skin().mesh;
+    std::vector<Index> all(mesh.vertex_count());
+    std::iota(all.begin(), all.end(), Index{0});
+    RunContext silent = context;
+    silent.progress = nullptr;
+    Result<FleshCarrier> carrier = FleshCarrier::create(flesh, all, silent);
+    if (!carrier) return carrier.error();
+    const MeshAnimation animation = {&mesh, clip.frames.size(), clip.frames_per_second,
+                                     [&](std::size_t frame, std::span<Vec3f> positions) -> Status {
+                                         carrier->at(clip, frame, positions, {}, silent);
+                                         return Success{};
+                                     }};
+    FittedMotion motion;
+    motion.report = fitted.report;
+    if (Status packed = pack_motion(fitted.model, poses, animation, kPackedError, motion, context); !packed)
+        return packed.error();
+    motion.flesh = motion_of(flesh, clip, *measure);
+    MovingMesh original = {before.path, before.clips, clip.clip, before.joints, clip.frames_per_second};
+    Result<std::vector<std::vector<Vec3f>>> skinned = skin_frames(flesh.skin(), clip, context);
+    if (!skinned) return skinned.error();
+    original.frames = std::move(*skinned);
+    return FleshedClips::Clip{std::make_shared<const MovingMesh>(std::move(original)),
+                              std::make_shared<const FittedMotion>(std::move(motion))};
+}
+
+} // namespace
+
 Result<State> fleshed_state(State state, const FleshSettings& settings, const RunContext& context) {
     const auto before = state.recording->original;
     Result<SkinnedMesh> read = read_skin(path_of(before->path), context);
     if (!read) return read.error();
     if (before->clip >= read->clips.size())
         return Error{ErrorCode::mismatch, "The file has changed since it was opened; open it again."};
-    const std::array clips = {before->clip};
+    if (!(read->clips[before->clip].seconds > 0))
+        return Error{ErrorCode::unsuitable,
+                     "Clip '" + read->clips[before->clip].name + "' is a single pose; show one that moves."};
+    std::vector<std::size_t> numbers;
+    for (std::size_t c = 0; c < read->clips.size(); ++c)
+        if (read->clips[c].seconds > 0) numbers.push_back(c);
     FleshOptions options = options_of(settings);
     if (const auto softness = softness_of(state); softness && softness->size() == read->mesh.vertex_count())
         options.loose = *softness;
-    const Result<Flesh> flesh = Flesh::create(std::move(*read), options, clips, context);
+    const Result<Flesh> flesh = Flesh::create(std::move(*read), options, numbers, context);
     if (!flesh) return flesh.error();
-    FleshClipOptions how;
-    how.loop = settings.loop;
-    how.ground = settings.ground;
-    const Result<FleshClip> clip = simulate_flesh(*flesh, before->clip, how, context);
-    if (!clip) return clip.error();
-    context.report("measuring the flesh", 0);
-    const Result<FleshMeasure> measure = measure_flesh(*flesh, *clip, 0, context);
-    if (!measure) return measure.error();
-
-    const Mesh& mesh = flesh->skin().mesh;
-    std::vector<Index> all(mesh.vertex_count());
-    std::iota(all.begin(), all.end(), Index{0});
-    RunContext silent = context;
-    silent.progress = nullptr;
-    Result<FleshCarrier> carrier = FleshCarrier::create(*flesh, all, silent);
-    if (!carrier) return carrier.error();
-    const MeshAnimation animation = {&mesh, clip->frames.size(), clip->frames_per_second,
-                                     [&](std::size_t frame, std::span<Vec3f> positions) -> Status {
-                                         carrier->at(*clip, frame, positions, {}, silent);
-                                         return Success{};
-                                     }};
-    Result<FittedMotion> fitted = fit_to(animation, {.base = settings.joints}, kPackedError, state, context);
+    const Result<std::vector<FleshClip>> clips = simulated_clips(*flesh, numbers, settings, context);
+    if (!clips) return clips.error();
+    auto made = std::make_shared<FleshedClips>();
+    Result<FittedFlesh> fitted = fit_flesh(*flesh, *clips, settings.joints, context);
     if (!fitted) return fitted.error();
-    fitted->flesh = motion_of(*flesh, *clip, *measure);
-
-    auto source = source_of(mesh, before->path, state.source->name, context);
+    made->fitted = std::move(*fitted);
+    for (std::size_t c = 0; c < clips->size(); ++c) {
+        Result<FleshedClips::Clip> clip =
+            fleshed_clip(*flesh, (*clips)[c], made->fitted, made->fitted.poses[c], *before, context);
+        if (!clip) return clip.error();
+        made->clips.push_back(std::move(*clip));
+    }
+    auto source = source_of(flesh->skin().mesh, before->path, state.source->name, context);
     source->contents = state.source->contents;
     source->warnings = state.source->warnings;
     state.source = std::move(source);
-    MovingMesh original = {before->path, before->clips, before->clip, before->joints, clip->frames_per_second};
-    Result<std::vector<std::vector<Vec3f>>> skinned = skin_frames(flesh->skin(), *clip, context);
-    if (!skinned) return skinned.error();
-    original.frames = std::move(*skinned);
-    auto recording = std::make_shared<Recording>(*state.recording);
-    recording->original = std::make_shared<const MovingMesh>(std::move(original));
-    recording->fitted = std::make_shared<const FittedMotion>(std::move(*fitted));
-    state.recording = std::move(recording);
+    state.strip.base = made->fitted.report.driver_vertices;
+    state.model = std::shared_ptr<const Model>(made, &made->fitted.model);
+    state.recording = recording_of_clip(made, before->clip);
     return state;
 }
 
@@ -112,6 +162,8 @@ QString flesh_summary(const Recording& recording) {
                        .arg(counted(flesh.particles, "particle", "particles"), number_text(flesh.measure.least_volume),
                             number_text(flesh.measure.most_volume), number_text(flesh.measure.skin_least_volume),
                             number_text(flesh.measure.skin_most_volume));
+    if (const std::size_t count = recording.clips->clips.size(); count > 1)
+        text += QString(" All %1 clips are flesh: choose one to play.").arg(count);
     if (!flesh.is_sound)
         text += " It cannot be trusted: the motion was not finite somewhere, or substeps were too long. Lower the "
                 "stiffness.";
@@ -151,7 +203,7 @@ QString flesh_advice(const Recording& recording) {
         lines << "The flesh is far from its skin; raise Stiffness, or Core, to hold it.";
     if (flesh.is_loop && flesh.loop_rms > kRestlessLoop)
         lines << "The flesh does not settle into a cycle; raise Damping.";
-    if (flesh.measure.is_closed && flesh.measure.least_volume < kMuchVolumeLost)
+    if (flesh.measure.is_closed && flesh.measure.least_volume < kMuchVolumeLost && flesh.made.scaled.empty())
         lines << "The body loses volume; a smaller Core lets the joints keep it.";
     return lines.join('\n');
 }

@@ -111,7 +111,9 @@ public:
     bool can_fit() const;                        ///< an animation is there, and it is no skin of flesh
     const FleshSettings& flesh_settings() const; ///< of the flesh made next; no part of the document
     void set_flesh_settings(const FleshSettings& settings);
-    void make_flesh(); ///< of the clip, in the background; again: of the skin
+    void make_flesh(); ///< of all clips, in the background; again: of the skin
+    /// Another clip of the file that is open: its flesh where there is some, else the file's motion.
+    void show_clip(std::size_t clip);
     bool can_make_flesh() const;
     void save_packed(const std::string& path); ///< the fitted model, in few bytes
     // Detail

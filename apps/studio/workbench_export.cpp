@@ -44,10 +44,15 @@ Result<QString> write_skin(const State& state, const GlbSettings& settings, cons
     options.influences = settings.six_joints ? 6 : 3;
     options.normals = settings.normals ? ExportNormals::keep : ExportNormals::leave;
     options.materials_beside = path_of(state.source->path);
+    auto clips = state.recording->clips;
+    if (clips && state.model.get() != &clips->fitted.model) clips = nullptr; // the driver was made anew
     const Result<ExportReport> report =
-        write_skin_glb(*state.model, poses_of(*state.recording), options, path_of(path), context);
+        clips ? write_skin_glb(clips->fitted.model, clips->fitted.animations(), clips->fitted.morphs, options,
+                               path_of(path), context)
+              : write_skin_glb(*state.model, poses_of(*state.recording), options, path_of(path), context);
     if (!report) return report.error();
-    return with_warnings(QString("Saved %1: %2").arg(file_name(path), skin_text(*report)), report->warnings);
+    const QString count = clips ? counted(clips->clips.size(), "clip", "clips") + ", " : QString();
+    return with_warnings(QString("Saved %1: %2%3").arg(file_name(path), count, skin_text(*report)), report->warnings);
 }
 
 /// What melts has other faces in every frame: key frames, each a mesh of its own.

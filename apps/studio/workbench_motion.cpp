@@ -154,6 +154,24 @@ void Workbench::make_flesh() {
         flesh_summary);
 }
 
+void Workbench::show_clip(std::size_t clip) {
+    const auto recording = state().recording;
+    if (!recording || !recording->original || recording->original->clip == clip) return;
+    if (!recording->clips) return open_motion(recording->original->path, clip);
+    if (is_refused(kOpenTopic, "A file is being opened: go on once it is there, or cancel.")) return;
+    pause();
+    const auto other = recording_of_clip(recording->clips, clip);
+    const QString name = QString::fromStdString(recording->original->clips[clip]);
+    if (!other) {
+        Q_EMIT flesh_settings_changed(); // the choice shows the clip that stays
+        return Q_EMIT told(QString("Clip '%1' is a single pose and has no flesh.").arg(name), true);
+    }
+    document_.edit("Clip " + name, [&](State& state) { state.recording = other; });
+    frame_ = 0;
+    show_pose();
+    Q_EMIT timeline_changed();
+}
+
 /// A driver and its poses in place of the recording there is, in the background.
 void Workbench::change_motion(const QString& title, const QString& name,
                               std::function<Result<State>(State, const RunContext&)> make,

@@ -5,10 +5,12 @@
 //     const FleshClip clip = simulate_flesh(flesh, 0).value();              // the first clip of the file
 //     FleshCarrier carrier = FleshCarrier::create(flesh, vertices).value(); // vertices of the mesh, such as a driver's
 //     carrier.at(clip, 10, positions, gradients);
+//     const FittedFlesh small = fit_flesh(flesh, std::span(&clip, 1)).value(); // a model and its poses, for export
 //
 // docs/flesh.md says what to change when.
 #pragma once
 
+#include "filigree/fit.h"
 #include "filigree/physics/simulation.h"
 #include "filigree/skin.h"
 
@@ -146,12 +148,12 @@ public:
     /// bind pose. Cost O(particles).
     void targets(std::span<const Eigen::Affine3d> transforms, const Vec3d& offset, Vectors& positions,
                  Vectors* accelerations, const RunContext& context = RunContext()) const;
-    /// Targets, with the cells that the joints crush there open again as far as what is held lets them: where a
-    /// simulation starts, as crushed cells would fly apart. Cost: 60 passes over those cells.
     /// The rest shape of the matter where joints change their size or stretch, one matrix a particle, as
     /// Simulation::set_targets takes it; empty where none does.
     std::vector<Mat3f> stretches(std::span<const Eigen::Affine3d> transforms,
                                  const RunContext& context = RunContext()) const;
+    /// Targets, with the cells that the joints crush there open again as far as what is held lets them: where a
+    /// simulation starts, as crushed cells would fly apart. Cost: 60 passes over those cells.
     Vectors settled(const Vectors& targets) const;
 
 private:
@@ -222,6 +224,24 @@ private:
     explicit FleshCarrier(std::unique_ptr<Content> content);
     std::unique_ptr<Content> content_;
 };
+
+/// The flesh of clips as one small model, and its poses in each of them.
+struct FittedFlesh {
+    Model model;
+    std::vector<std::string> names;          ///< of the clips; those of one name get numbers
+    std::vector<PoseSequence> poses;         ///< of each clip; a loop ends with the pose that it begins with
+    FitReport report;                        ///< over the frames of all clips
+    std::vector<SkinMorph> morphs;           ///< of the skin, on top of the flesh
+    std::vector<MorphWeights> morph_weights; ///< of each clip, or empty
+
+    /// For write_skin_glb (skin.h): valid while this stays where it is.
+    std::vector<NamedPoses> animations() const;
+};
+/// Fits a driver of about so many joints to all clips at once, with fit_animation. joints: 12 or more. Cost: that of
+/// fit_animation. Errors: usage (no clips; fewer joints), unsuitable (faces with fewer than 12 places), and those of
+/// fit_animation.
+Result<FittedFlesh> fit_flesh(const Flesh& flesh, std::span<const FleshClip> clips, std::size_t joints = 300,
+                              const RunContext& context = RunContext());
 
 /// What became of a clip, beside its skin alone.
 struct FleshMeasure {

@@ -39,6 +39,16 @@ struct SkinClip {
     double seconds = 0; ///< from its first key to its last
 };
 
+/// A morph target of a skin: what it adds to the bind pose, before the joints carry it.
+struct SkinMorph {
+    std::string name;
+    double weight = 0;                     ///< so much of it is in SkinnedMesh::mesh
+    std::vector<Index> vertices;           ///< that it moves, ascending
+    std::vector<Vec3f> positions, normals; ///< what it adds to each; normals: empty where the file has none
+};
+/// The weights of all morph targets of a skin, seconds after the start of a clip.
+using MorphWeights = std::function<void(double seconds, std::span<double> weights)>;
+
 struct SkinnedMesh {
     Mesh mesh; ///< in the bind pose, upright as the file shows it
     std::vector<SkinJoint> joints;
@@ -53,11 +63,14 @@ struct SkinnedMesh {
     /// Where a clip has the vertices, one each, relative to the mesh's origin, if the joints only come near to it.
     /// Null: skin_positions says it.
     std::function<Status(std::size_t clip, double seconds, std::span<Vec3f> positions)> surface = {};
+    /// Of the file; neither transforms nor surface know them.
+    std::vector<SkinMorph> morphs = {};
+    std::vector<MorphWeights> morph_weights = {}; ///< of each clip; empty: there are no morph targets
 };
 
 /// Reads an animated glTF. Vertices are those of read_mesh, in its order. Skins that share joints become one. Meshes
-/// without a skin get their node as a joint. Morph targets stay as they are at rest. Errors: those of read_mesh;
-/// unsuitable (no skin; no animation; joints of scale zero).
+/// without a skin get their node as a joint. Morph targets are as at rest in the mesh, and beside it. Errors: those of
+/// read_mesh; unsuitable (no skin; no animation; joints of scale zero).
 Result<SkinnedMesh> read_skin(const std::filesystem::path& path, const RunContext& context = RunContext());
 
 /// Where a clip has the vertices, relative to the mesh's origin: SkinnedMesh::surface, or skin_positions. Errors: those
@@ -77,14 +90,16 @@ Eigen::Affine3d blended_transform(const SkinnedMesh& skin, std::span<const Eigen
 struct NamedPoses {
     std::string name;
     FrameSource<Pose> poses;
+    MorphWeights morph_weights = {}; ///< null: morph targets stay
 };
 
 /// As write_skin_glb of one animation (file.h), with several: each becomes an animation of its name on the same joints.
-/// The report's errors are the largest of all, its keys and seconds are those of all together. Errors: those of
-/// write_skin_glb, usage (two of one name).
+/// morphs: targets that move the model's vertices, at the finest level; the report's errors are without them. The
+/// report's errors are the largest of all, its keys and seconds are those of all together. Errors: those of
+/// write_skin_glb, usage (two of one name; a morph target of other vertices).
 Result<ExportReport> write_skin_glb(const Model& model, std::span<const NamedPoses> animations,
-                                    const SkinOptions& options, const std::filesystem::path& path,
-                                    const RunContext& context = RunContext());
+                                    std::span<const SkinMorph> morphs, const SkinOptions& options,
+                                    const std::filesystem::path& path, const RunContext& context = RunContext());
 
 /// The first thing wrong with a skin, as a sentence, or "". Cost O(size).
 std::string check_skin(const SkinnedMesh& skin);

@@ -361,6 +361,27 @@ TEST(Flesh, MatterGrowsWithItsJoint) {
     }
 }
 
+/// One model follows all clips; clips of one name get numbers, and a loop ends with its first pose.
+TEST(Flesh, AllClipsBecomeOneModel) {
+    SkinnedMesh skin = tube(kCoarse, 0.5, waving(30, 2));
+    skin.clips = {{"waves", 0.5}, {"waves", 0.25}};
+    const Flesh flesh = Flesh::create(skin, kSmall).value();
+    std::vector<FleshClip> clips;
+    for (const std::size_t clip : {0u, 1u})
+        clips.push_back(simulate_flesh(flesh, clip, {.frames_per_second = 30, .loop = clip == 0}).value());
+    const FittedFlesh fitted = fit_flesh(flesh, clips, 60).value();
+    EXPECT_EQ(fitted.names, (std::vector<std::string>{"waves", "waves 2"}));
+    ASSERT_EQ(fitted.poses.size(), 2u);
+    EXPECT_EQ(fitted.poses[0].frames.size(), clips[0].frames.size());
+    EXPECT_EQ(fitted.poses[1].frames.size(), clips[1].frames.size());
+    EXPECT_EQ(fitted.poses[0].frames.front().positions, fitted.poses[0].frames.back().positions);
+    EXPECT_EQ(fitted.report.frames, clips[0].frames.size() + clips[1].frames.size());
+    EXPECT_LT(fitted.report.rms, 5e-3);
+    EXPECT_EQ(fitted.animations()[1].name, "waves 2");
+    EXPECT_EQ(fit_flesh(flesh, {}, 60).error().code, ErrorCode::usage);
+    EXPECT_EQ(fit_flesh(flesh, clips, 3).error().code, ErrorCode::usage);
+}
+
 TEST(Flesh, LimbsThatACellGluesAreTold) {
     const auto limbs = [](float gap) {
         SkinnedMesh skin;

@@ -14,8 +14,10 @@ namespace filigree_test {
 /// The tube of made_skins.h with the clips "Bend" (the lower joint turns by 90 degrees about z in a second), "Still"
 /// (one key) and "Wave" (there and back in a second). armature: JSON members of the node above the joints, such as a
 /// scale. parts: 2 gives its left and right half a mesh and a skin each. rod: hangs a tetrahedron without a skin on the
-/// lower joint.
-inline std::string skinned_tube(const std::string& armature = "", int parts = 1, bool rod = false) {
+/// lower joint. morphs: the targets "bulge", of which 0.25 is there and which goes from 0 to 1 in "Bend", and
+/// "narrow"; with normals.
+inline std::string skinned_tube(const std::string& armature = "", int parts = 1, bool rod = false,
+                                bool morphs = false) {
     using namespace filigree;
     const Mesh tube = make_cylinder({.resolution = 6, .size = 0.2, .length = 5});
     const Triangulation cut = triangulate(tube);
@@ -32,6 +34,22 @@ inline std::string skinned_tube(const std::string& armature = "", int parts = 1,
                                    std::to_string(file.add(places, "VEC3", R"("min":[-1,-1,-1],"max":[1,1,1])")) +
                                    R"(,"JOINTS_0":)" + std::to_string(file.add(joints, 5121, "VEC4")) +
                                    R"(,"WEIGHTS_0":)" + std::to_string(file.add(weights, "VEC4")) + "}";
+    std::string targets, names;
+    if (morphs) {
+        std::vector<float> bulges, narrows, turns, none;
+        for (const Vec3f& p : tube.positions) {
+            bulges.insert(bulges.end(), {0, p.x() > 0.2f ? 0.1f : 0.0f, 0});
+            narrows.insert(narrows.end(), {0, -0.2f * p.y(), -0.2f * p.z()});
+            turns.insert(turns.end(), {0.1f, 0, 0});
+        }
+        const std::string bounds = R"("min":[-1,-1,-1],"max":[1,1,1])";
+        const auto target = [&](const std::vector<float>& moves) {
+            return R"({"POSITION":)" + std::to_string(file.add(moves, "VEC3", bounds)) + R"(,"NORMAL":)" +
+                   std::to_string(file.add(turns, "VEC3")) + "}";
+        };
+        targets = R"(,"targets":[)" + target(bulges) + "," + target(narrows) + "]";
+        names = R"(,"weights":[0.25,0],"extras":{"targetNames":["bulge","narrow"]})";
+    }
     // At bind the joints are at (-0.5, 0, 0) and at the origin.
     const std::string binds = std::to_string(file.add(
         {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.5f, 0, 0, 1, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, "MAT4"));
@@ -44,7 +62,7 @@ inline std::string skinned_tube(const std::string& armature = "", int parts = 1,
         }
         const std::string number = std::to_string(part), comma = part > 0 ? "," : "";
         meshes += comma + R"({"primitives":[{)" + attributes + R"(,"indices":)" +
-                  std::to_string(file.add_indices(indices)) + "}]}";
+                  std::to_string(file.add_indices(indices)) + targets + "}]" + names + "}";
         skins += comma + R"({"joints":[1,2],"inverseBindMatrices":)" + binds + "}";
         if (part > 0) nodes += R"({"name":"tube )" + number + R"(","mesh":)" + number + R"(,"skin":)" + number + "},";
         roots += comma + std::to_string(part == 0 ? 3 : 4);
@@ -64,9 +82,13 @@ inline std::string skinned_tube(const std::string& armature = "", int parts = 1,
     const auto there_and_back = std::to_string(file.add({0, 0.5f, 1}, "SCALAR", R"("min":[0],"max":[1])"));
     const auto waves = std::to_string(file.add({0, 0, 0, 1, 0, 0, 0.38268343f, 0.92387953f, 0, 0, 0, 1}, "VEC4"));
     const auto turn = std::to_string(file.add({0, 0, 0, 1}, "VEC4"));
-    const auto clip = [](const std::string& name, const std::string& input, const std::string& output) {
-        return R"({"name":")" + name + R"(","samplers":[{"input":)" + input + R"(,"output":)" + output +
-               R"(}],"channels":[{"sampler":0,"target":{"node":2,"path":"rotation"}}]})";
+    const auto weights_of = std::to_string(file.add({0, 0, 1, 0}, "SCALAR"));
+    const auto clip = [&](const std::string& name, const std::string& input, const std::string& output) {
+        const bool bulges = morphs && name == "Bend";
+        return R"({"name":")" + name + R"(","samplers":[{"input":)" + input + R"(,"output":)" + output + "}" +
+               (bulges ? R"(,{"input":)" + input + R"(,"output":)" + weights_of + "}" : "") +
+               R"(],"channels":[{"sampler":0,"target":{"node":2,"path":"rotation"}})" +
+               (bulges ? R"(,{"sampler":1,"target":{"node":3,"path":"weights"}})" : "") + "]}";
     };
     return file.text(R"("scene":0,"scenes":[{"nodes":[0,)" + roots + R"(]}],"meshes":[)" + meshes + R"(],"skins":[)" +
                      skins + R"(],"nodes":[{"name":"armature","children":[1])" + (armature.empty() ? "" : ",") +

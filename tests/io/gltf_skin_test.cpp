@@ -102,6 +102,45 @@ TEST_F(GltfSkin, MeshesWithoutASkinHangOnTheirNode) {
     EXPECT_LT((transforms[2].matrix() - transforms[1].matrix()).norm(), 1e-6);
 }
 
+/// Morph targets as the bind pose has them: with the joints they are where a viewer shows them.
+TEST_F(GltfSkin, MorphTargetsLieBesideTheMesh) {
+    for (const char* armature : {"", R"("scale":[0.01,0.01,0.01])", R"("scale":[-1,1,1])",
+                                 R"("rotation":[-0.70710678,0,0,0.70710678],"scale":[100,100,100])"}) {
+        const std::string text = skinned_tube(armature, 1, true, true);
+        const SkinnedMesh skin = read(text).value();
+        EXPECT_EQ(check_skin(skin), "");
+        ASSERT_EQ(skin.morphs.size(), 2u);
+        EXPECT_EQ(skin.morphs[0].name, "bulge");
+        EXPECT_EQ(skin.morphs[1].name, "narrow");
+        EXPECT_EQ(skin.morphs[0].weight, 0.25);
+        EXPECT_EQ(skin.morphs[0].normals.size(), skin.morphs[0].vertices.size());
+        ASSERT_EQ(skin.morph_weights.size(), 3u);
+        std::vector<double> weights(2);
+        skin.morph_weights[0](0.5, weights);
+        EXPECT_NEAR(weights[0], 0.5, 1e-6);
+        skin.morph_weights[2](0.5, weights);
+        EXPECT_EQ(weights[0], 0.25);
+        const GltfScene scene = GltfScene::read(text, "tube.gltf", RunContext()).value();
+        std::vector<Vec3f> shown(scene.mesh().vertex_count()), ours(shown.size());
+        ASSERT_TRUE(scene.positions(0, 0.8, shown, RunContext()).ok());
+        std::vector<Eigen::Affine3d> transforms(skin.joints.size());
+        skin.transforms(0, 0.8, transforms);
+        SkinnedMesh moved = skin;
+        skin.morph_weights[0](0.8, weights);
+        for (std::size_t m = 0; m < 2; ++m)
+            for (std::size_t i = 0; i < skin.morphs[m].vertices.size(); ++i)
+                moved.mesh.positions[skin.morphs[m].vertices[i]] +=
+                    float(weights[m] - skin.morphs[m].weight) * skin.morphs[m].positions[i];
+        skin_positions(moved, transforms, ours);
+        const double size = bounds(skin.mesh).size().maxCoeff();
+        for (std::size_t v = 0; v < ours.size(); ++v)
+            ASSERT_LT(
+                (ours[v].cast<double>() + skin.mesh.origin - shown[v].cast<double>() - scene.mesh().origin).norm(),
+                2e-6 * size)
+                << armature;
+    }
+}
+
 TEST_F(GltfSkin, RefusesWhatHasNoJointsOrNoMotion) {
     const auto refused = [&](const std::string& text) {
         const Result<SkinnedMesh> skin = read(text);

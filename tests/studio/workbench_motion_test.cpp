@@ -5,6 +5,7 @@
 
 #include "filigree/file.h"
 #include "filigree/fit.h"
+#include "filigree/io/gltf/gltf.h"
 #include "filigree/io/system/file.h"
 #include "filigree/skin.h"
 
@@ -230,10 +231,27 @@ TEST_F(Motion, ASkinBecomesFleshBesideItself) {
     bench.wait_until_idle();
     ASSERT_TRUE(bench.error());
     EXPECT_GT(bench.error()->max, 0);
+    // All clips that move are there, and leave together.
     bench.export_animation(path("soft.glb"));
     bench.wait_until_idle();
     EXPECT_TRUE(errors.empty()) << errors[0];
-    EXPECT_TRUE(fs::exists(path("soft.glb")));
+    const GltfScene soft = GltfScene::read(path("soft.glb"), RunContext()).value();
+    ASSERT_EQ(soft.animations().size(), 2u);
+    EXPECT_EQ(soft.animations()[1].name, "Wave");
+    bench.show_clip(2);
+    EXPECT_EQ(state().recording->original->clip, 2u);
+    EXPECT_TRUE(state().recording->fitted->flesh);
+    EXPECT_EQ(bench.frame_count(), state().recording->original->frames.size());
+    const PoseSequence& waves = state().recording->clips->fitted.poses[1];
+    EXPECT_EQ(state().recording->frames.back()->positions, waves.frames.back().positions);
+    EXPECT_TRUE(errors.empty());
+    bench.show_clip(1); // a single pose
+    EXPECT_EQ(state().recording->original->clip, 2u);
+    ASSERT_EQ(errors.size(), 1u);
+    EXPECT_NE(errors[0].find("'Still' is a single pose"), std::string::npos) << errors[0];
+    errors.clear();
+    undo_stack().undo();
+    EXPECT_EQ(state().recording->original->clip, 0u);
     undo_stack().undo();
     EXPECT_TRUE(bench.can_fit());
     settings.soft = {"tail"};

@@ -51,7 +51,7 @@ private:
                        {"flesh.clip", "Clip", "Which of the file's animations",
                         [this] { return original() ? double(original()->clip) : 0; },
                         [this](double row) {
-                            if (original() && row >= 0) workbench().open_motion(original()->path, std::size_t(row));
+                            if (original() && row >= 0) workbench().show_clip(std::size_t(row));
                         },
                         [this] { return original() && original()->clips.size() > 1; }},
                        {});

@@ -146,6 +146,7 @@ class Flesh:
         *,
         particles: int = 5000,
         stiffness: float = 15000.0,
+        poisson_ratio: float = 0.47,
         density: float = 1000.0,
         core: float = 0.5,
         frequency: float = 10.0,
@@ -173,6 +174,22 @@ class Flesh:
     @property
     def leash(self) -> _Floats: ...
     def targets(self, clip: str | int, seconds: float) -> tuple[_Floats, _Floats]: ...
+    def stretches(self, clip: str | int, seconds: float) -> _Floats | None: ...
+    def export(
+        self,
+        path: _Path,
+        clips: Sequence[str | int] | None = None,
+        *,
+        loop: bool = False,
+        ground: bool = False,
+        self_contact: bool = True,
+        frames_per_second: float = 60.0,
+        joints: int = 300,
+        key_rate: float | None = 30.0,
+        compress: bool = False,
+        threads: int = 0,
+        progress: _Progress | None = None,
+    ) -> tuple[Model, dict[str, PoseSequence], dict[str, Any]]: ...
     def simulate(
         self,
         clip: str | int,
@@ -688,9 +705,15 @@ class Simulation:
         leash: ArrayLike | None = None,
         leash_frequency: float = 20.0,
         most_acceleration: float = 100.0,
+        stretches: ArrayLike | None = None,
     ) -> None: ...
     def set_targets(
-        self, body: int, positions: ArrayLike, velocities: ArrayLike, accelerations: ArrayLike | None = None
+        self,
+        body: int,
+        positions: ArrayLike,
+        velocities: ArrayLike,
+        accelerations: ArrayLike | None = None,
+        stretches: ArrayLike | None = None,
     ) -> None: ...
     def set_hands(self, hands: Sequence[Hand]) -> None: ...
     def set_air(self, temperature: _Keyed, heat_transfer: float) -> None: ...
@@ -838,6 +861,7 @@ def read_skin(
     mesh: _MeshLike | None = None,
     by_surface: bool = False,
     frames_per_second: float | None = None,
+    patches: int = 400,
     threads: int = 0,
     progress: _Progress | None = None,
 ) -> Skin: ...

@@ -1,5 +1,6 @@
 #include "bodies.h"
 #include "calls.h"
+#include "models.h"
 
 #include <filigree/flesh.h>
 
@@ -14,11 +15,13 @@ using SkinPtr = std::shared_ptr<const SkinnedMesh>;
 struct PySkin {
     SkinPtr skin;
     MeshPtr mesh;
+    std::filesystem::path path; ///< of the file that it was read from
 };
 
 struct PyFlesh {
     std::shared_ptr<const Flesh> flesh;
     PyBody body;
+    std::filesystem::path path; ///< of the skin
 };
 
 /// A clip by its name or its number.
@@ -52,15 +55,16 @@ std::vector<Vec3d> in_world(std::span<const Vec3f> positions, const Vec3d& origi
 }
 
 PySkin read(const std::filesystem::path& path, const py::object& mesh, bool by_surface,
-            std::optional<double> frames_per_second, unsigned threads, const py::object& progress) {
+            std::optional<double> frames_per_second, std::size_t patches, unsigned threads,
+            const py::object& progress) {
     const MeshPtr rest = mesh.is_none() ? nullptr : mesh_of(mesh);
     const CharacterOptions options{
-        .rest = rest.get(), .by_joints = !by_surface, .frames_per_second = frames_per_second};
+        .rest = rest.get(), .by_joints = !by_surface, .frames_per_second = frames_per_second, .patches = patches};
     SkinnedMesh skin = LongCall{threads, progress}(
         [&](const RunContext& context) { return read_character(path, options, context).value(); });
     warn(skin.warnings);
     const auto kept = std::make_shared<const SkinnedMesh>(std::move(skin));
-    return {kept, std::make_shared<Mesh>(kept->mesh)};
+    return {kept, std::make_shared<Mesh>(kept->mesh), path};
 }
 
 /// World to world, (j, 4, 4).
@@ -84,13 +88,15 @@ py::array_t<double> plain_positions(const PySkin& self, const py::object& clip, 
     return take(in_world(positions, self.skin->mesh.origin));
 }
 
-PyFlesh make_flesh(const PySkin& skin, std::size_t particles, double stiffness, double density, double core,
-                   double frequency, double surface_frequency, double damping, const py::object& soft, double strength,
-                   const py::object& loose, const py::object& through, bool separate, std::optional<double> scale,
-                   bool sculpted_gravity, const py::object& clips, unsigned threads, const py::object& progress) {
+PyFlesh make_flesh(const PySkin& skin, std::size_t particles, double stiffness, double poisson_ratio, double density,
+                   double core, double frequency, double surface_frequency, double damping, const py::object& soft,
+                   double strength, const py::object& loose, const py::object& through, bool separate,
+                   std::optional<double> scale, bool sculpted_gravity, const py::object& clips, unsigned threads,
+                   const py::object& progress) {
     FleshOptions options;
     options.particles = particles;
     options.material.young_modulus = stiffness;
+    options.material.poisson_ratio = poisson_ratio;
     options.material.density = density;
     options.core = core;
     options.frequency = frequency;
@@ -116,7 +122,7 @@ PyFlesh make_flesh(const PySkin& skin, std::size_t particles, double stiffness, 
         [&](const RunContext& context) { return Flesh::create(*skin.skin, options, numbers, context).value(); });
     warn(made.report().warnings);
     const auto kept = std::make_shared<const Flesh>(std::move(made));
-    return {kept, PyBody{kept->body(), skin.skin->mesh.origin, kept->report().body}};
+    return {kept, PyBody{kept->body(), skin.skin->mesh.origin, kept->report().body}, skin.path};
 }
 
 py::tuple targets(const PyFlesh& self, const py::object& clip, double seconds) {
@@ -167,6 +173,60 @@ py::tuple simulate(const PyFlesh& self, const py::object& clip, bool loop, bool 
     });
     const Shape shape{static_cast<py::ssize_t>(made.frames.size()), static_cast<py::ssize_t>(count), 3};
     return py::make_tuple(take<double>(std::move(world), shape), said_of(made, measure));
+}
+
+/// The clips that are named, or all that move.
+std::vector<std::size_t> clips_of(const SkinnedMesh& skin, const py::object& given) {
+    std::vector<std::size_t> numbers;
+    if (given.is_none()) {
+        for (std::size_t c = 0; c < skin.clips.size(); ++c)
+            if (skin.clips[c].seconds > 0) numbers.push_back(c);
+    } else {
+        for (const py::handle clip : py::list(given)) numbers.push_back(clip_of(skin, clip));
+    }
+    return numbers;
+}
+
+/// All clips as one file.
+py::tuple export_flesh(const PyFlesh& self, const std::filesystem::path& path, const py::object& clips, bool loop,
+                       bool ground, bool self_contact, double frames_per_second, std::size_t joints,
+                       std::optional<double> key_rate, bool compress, unsigned threads, const py::object& progress) {
+    const Flesh& flesh = *self.flesh;
+    const std::vector<std::size_t> numbers = clips_of(flesh.skin(), clips);
+    FleshClipOptions options;
+    options.loop = loop;
+    options.ground = ground;
+    options.self_contact = self_contact;
+    options.frames_per_second = frames_per_second;
+    SkinOptions skin;
+    skin.key_rate = key_rate;
+    skin.compress = compress;
+    skin.materials_beside = self.path;
+    std::vector<FleshClip> made;
+    std::vector<FleshMeasure> measures;
+    ExportReport written;
+    FittedFlesh fitted = LongCall{threads, progress}([&](const RunContext& context) {
+        for (const std::size_t number : numbers) {
+            made.push_back(simulate_flesh(flesh, number, options, context).value());
+            measures.push_back(measure_flesh(flesh, made.back(), 0, context).value());
+        }
+        FittedFlesh of_all = fit_flesh(flesh, made, joints, context).value();
+        written = write_skin_glb(of_all.model, of_all.animations(), of_all.morphs, skin, path, context).value();
+        return of_all;
+    });
+    warn(written.warnings);
+    py::dict poses, said;
+    for (std::size_t c = 0; c < made.size(); ++c) {
+        said[py::str(fitted.names[c])] = said_of(made[c], measures[c]);
+        poses[py::str(fitted.names[c])] = py::cast(std::move(fitted.poses[c]));
+    }
+    py::dict report;
+    report["rms"] = fitted.report.rms;
+    report["max"] = fitted.report.max;
+    report["driver_vertices"] = fitted.report.driver_vertices;
+    report["frames"] = fitted.report.frames;
+    return py::make_tuple(PyModel{std::make_shared<const Model>(std::move(fitted.model)), std::move(report)}, poses,
+                          said);
 }
 
 } // namespace
@@ -238,10 +298,11 @@ What the joints do to the bind pose at a moment of a clip (its name or number): 
 
 Where plain skinning has the vertices at a moment of a clip (its name or number): (n, 3), world.
 )");
-    m.def("read_skin", &read, py::arg("path"), py::kw_only(), py::arg("mesh") = py::none(),
-          py::arg("by_surface") = false, py::arg("frames_per_second") = py::none(), py::arg("threads") = 0,
-          py::arg("progress") = py::none(),
-          R"(read_skin(path, *, mesh=None, by_surface=False, frames_per_second=None, threads=0, progress=None)
+    m.def(
+        "read_skin", &read, py::arg("path"), py::kw_only(), py::arg("mesh") = py::none(), py::arg("by_surface") = false,
+        py::arg("frames_per_second") = py::none(), py::arg("patches") = 400, py::arg("threads") = 0,
+        py::arg("progress") = py::none(),
+        R"(read_skin(path, *, mesh=None, by_surface=False, frames_per_second=None, patches=400, threads=0, progress=None)
 --
 
 Read any file that moves as a Skin, for `Flesh`: an animated glTF by its skins, which become one, or by its morph
@@ -256,6 +317,9 @@ by_surface : bool
     Take a skin as a moving surface too, so that its morph targets move as well.
 frames_per_second : float, optional
     Of files that do not say it; None: 60.
+patches : int
+    Of a surface without joints: so many patches, about, move its matter; what it does beside them, such as a blink, lies
+    on top. A face wants few (24).
 
 Raises
 ------
@@ -274,8 +338,12 @@ Parameters
 skin : Skin
 particles : int
     About.
-stiffness, density : float
-    Young's modulus, Pa; kg/m^3.
+stiffness : float
+    Young's modulus, Pa.
+poisson_ratio : float
+    0 to 0.49: how well the flesh keeps its volume while it is pressed. 0.49 does so best and takes twice as long.
+density : float
+    kg/m^3.
 core : float
     0 to 1: how far from the bones to the skin all is held.
 frequency, surface_frequency : float
@@ -301,13 +369,13 @@ clips : sequence of str or int, optional
 )")
         .def(
             py::init(&make_flesh), py::arg("skin"), py::kw_only(), py::arg("particles") = 5000,
-            py::arg("stiffness") = 1.5e4, py::arg("density") = 1000.0, py::arg("core") = 0.5,
-            py::arg("frequency") = 10.0, py::arg("surface_frequency") = 1.0, py::arg("damping") = 3.0,
-            py::arg("soft") = py::tuple(), py::arg("strength") = 0.02, py::arg("loose") = py::none(),
-            py::arg("through") = py::tuple(), py::arg("separate") = false, py::arg("scale") = py::none(),
-            py::arg("sculpted_gravity") = true, py::arg("clips") = py::none(), py::arg("threads") = 0,
-            py::arg("progress") = py::none(),
-            R"(__init__(self, skin, *, particles=5000, stiffness=15000.0, density=1000.0, core=0.5, frequency=10.0, surface_frequency=1.0, damping=3.0, soft=(), strength=0.02, loose=None, through=(), separate=False, scale=None, sculpted_gravity=True, clips=None, threads=0, progress=None)
+            py::arg("stiffness") = 1.5e4, py::arg("poisson_ratio") = 0.47, py::arg("density") = 1000.0,
+            py::arg("core") = 0.5, py::arg("frequency") = 10.0, py::arg("surface_frequency") = 1.0,
+            py::arg("damping") = 3.0, py::arg("soft") = py::tuple(), py::arg("strength") = 0.02,
+            py::arg("loose") = py::none(), py::arg("through") = py::tuple(), py::arg("separate") = false,
+            py::arg("scale") = py::none(), py::arg("sculpted_gravity") = true, py::arg("clips") = py::none(),
+            py::arg("threads") = 0, py::arg("progress") = py::none(),
+            R"(__init__(self, skin, *, particles=5000, stiffness=15000.0, poisson_ratio=0.47, density=1000.0, core=0.5, frequency=10.0, surface_frequency=1.0, damping=3.0, soft=(), strength=0.02, loose=None, through=(), separate=False, scale=None, sculpted_gravity=True, clips=None, threads=0, progress=None)
 --
 
 )")
@@ -332,6 +400,46 @@ clips : sequence of str or int, optional
 
 Where the joints want the particles at a moment of a clip, (p, 3), m, and what undoes gravity in the bind pose, (p, 3),
 m/s^2: Simulation.set_targets takes both.
+)")
+        .def(
+            "stretches",
+            [](const PyFlesh& self, const py::object& clip, double seconds) -> py::object {
+                std::vector<Mat3f> found =
+                    self.flesh->stretches(transforms_of(self.flesh->skin(), clip, seconds), short_context(1));
+                if (found.empty()) return py::none();
+                return take(std::move(found));
+            },
+            py::arg("clip"), py::arg("seconds"), R"(stretches(self, clip, seconds)
+--
+
+How the rest shape is stretched where joints change their size, (p, 3, 3), for Simulation.set_follow and set_targets;
+None where none does.
+)")
+        .def(
+            "export", &export_flesh, py::arg("path"), py::arg("clips") = py::none(), py::kw_only(),
+            py::arg("loop") = false, py::arg("ground") = false, py::arg("self_contact") = true,
+            py::arg("frames_per_second") = 60.0, py::arg("joints") = 300, py::arg("key_rate") = 30.0,
+            py::arg("compress") = false, py::arg("threads") = 0, py::arg("progress") = py::none(),
+            R"(export(self, path, clips=None, *, loop=False, ground=False, self_contact=True, frames_per_second=60.0, joints=300, key_rate=30.0, compress=False, threads=0, progress=None)
+--
+
+Simulate clips, fit one small model to all of them, and write it as a skin (.glb) with an animation each. Materials and
+morph targets of the file are kept.
+
+Parameters
+----------
+path : str or Path
+    .glb.
+clips : sequence of str or int, optional
+    None: all that move.
+joints : int
+    Of the file, about; 12 or more.
+key_rate : float, optional
+    Keys a second; None: one a frame.
+compress : bool
+    EXT_meshopt_compression and KHR_mesh_quantization, which viewers have to know.
+
+Returns the model, a dict of poses by the names of the clips, and a dict of what `simulate` says of each.
 )")
         .def(
             "simulate", &simulate, py::arg("clip"), py::kw_only(), py::arg("loop") = false, py::arg("ground") = false,

@@ -56,11 +56,43 @@ def test_flesh_is_loose_where_it_is_painted_and_limbs_pass(skin):
         filigree.Flesh(skin, particles=400, through=[("Tail", "Hips")])
 
 
+def test_all_clips_leave_as_one_file(skin, tmp_path):
+    flesh = filigree.Flesh(skin, particles=400, poisson_ratio=0.3)
+    assert flesh.body.material.poisson_ratio == pytest.approx(0.3)
+    assert flesh.stretches("Walk", 0.3) is None
+    model, poses, said = flesh.export(tmp_path / "soft.glb", frames_per_second=24, joints=40)
+    assert list(poses) == list(said) == ["Walk", "Jump"]
+    assert len(poses["Walk"]) == 27 and said["Jump"]["clamped_particles"] == 0
+    assert model.report["frames"] == len(poses["Walk"]) + len(poses["Jump"]) and model.report["rms"] < 5e-3
+    assert [name for name, _ in filigree.read_skin(tmp_path / "soft.glb").clips] == ["Walk", "Jump"]
+    with pytest.raises(filigree.UsageError, match="12 joints"):
+        flesh.export(tmp_path / "few.glb", ["Jump"], frames_per_second=24, joints=3)
+    with pytest.raises(filigree.UsageError):
+        filigree.Flesh(skin, particles=400, poisson_ratio=0.7)
+
+
+def test_a_rest_shape_grows():
+    body = filigree.Body(filigree.make("bar", resolution=4), "jelly", particles=200)
+    count = len(body.rest)
+    large, free, still = 1.2 * body.rest, numpy.zeros(count), numpy.zeros((count, 3))
+    stretches = numpy.tile(1.2 * numpy.eye(3), (count, 1, 1))
+    simulation = filigree.Simulation([body], automatic_rigid=False, mode="explicit", gravity=(0, 0, 0))
+    simulation.set_positions(0, large)
+    simulation.set_follow(0, free, large, still, leash=numpy.inf, stretches=stretches)
+    simulation.set_targets(0, large, still, stretches=stretches)
+    simulation.step()
+    assert numpy.allclose(simulation.positions(0), large, atol=1e-5)
+    with pytest.raises(filigree.UsageError, match="symmetric"):
+        simulation.set_targets(0, large, still, stretches=numpy.tile([[1, 1, 0], [0, 1, 0], [0, 0, 1.0]], (count, 1, 1)))
+
+
 def test_a_moving_surface_is_a_skin_too(tmp_path):
     bar = filigree.make("bar", resolution=8)
     frames = numpy.stack([bar.world_vertices + [0, 0.2 * numpy.sin(t / 4), 0] for t in range(20)])
     filigree.write_animation(bar, frames, tmp_path / "bar.pc2")
+    few = filigree.read_skin(tmp_path / "bar.pc2", mesh=bar, frames_per_second=24, patches=12)
     skin = filigree.read_skin(tmp_path / "bar.pc2", mesh=bar, frames_per_second=24)
+    assert len(few.joints) < len(skin.joints)
     assert skin.clips[0][0] == "bar" and skin.clips[0][1] == pytest.approx(19 / 24)
     assert numpy.allclose(skin.positions(0, 6 / 24), frames[6], atol=1e-5)
     with pytest.raises(filigree.UnsuitableError, match="positions alone"):

@@ -4,6 +4,7 @@
 #include "filigree/core/dense_solve.h"
 #include "filigree/core/math.h"
 #include "filigree/core/parallel_for.h"
+#include "filigree/io/gltf/glb_morphs.h"
 #include "filigree/io/gltf/gltf_scene.h"
 #include "filigree/io/system/file.h"
 
@@ -63,6 +64,7 @@ public:
         lay_out_joints();
         lay_out_weights();
         lay_out_clips();
+        lay_out_morphs();
         skin_.warnings.insert(skin_.warnings.begin(), scene_.warnings.begin(), scene_.warnings.end());
         return std::move(skin_);
     }
@@ -300,18 +302,13 @@ private:
 
     void lay_out_clips() {
         std::vector<double> begins;
-        bool moves_morphs = false;
         for (std::size_t a = 0; a < scene_.animations.size(); ++a) {
             const gltf::Animation& animation = scene_.animations[a];
             const GltfAnimation& summary = animation.summary;
             skin_.clips.push_back({summary.name.empty() ? "clip " + std::to_string(a + 1) : summary.name,
                                    std::max(0.0, summary.last_key - summary.first_key)});
             begins.push_back(summary.first_key);
-            for (const gltf::Channel& channel : animation.channels) moves_morphs |= channel.path == gltf::Path::weights;
         }
-        if (moves_morphs)
-            skin_.warnings.push_back("Morph targets are animated; the flesh does not follow them, and they stay as "
-                                     "they are at rest.");
         skin_.transforms = [scene = kept_, sources = std::move(sources_), begins, origin = skin_.mesh.origin](
                                std::size_t clip, double seconds, std::span<Eigen::Affine3d> transforms) {
             const gltf::Animation& animation = scene->animations[clip];
@@ -325,6 +322,63 @@ private:
         };
     }
 
+    /// What a block's morph targets add to the bind pose.
+    void add_targets(const gltf::Block& block, std::size_t first) {
+        const gltf::Geometry& geometry = scene_.geometries[block.geometry];
+        const Mat3d linear = block.skinned ? placed_[*scene_.nodes[block.node].skin]->linear : bind_[block.node].linear;
+        const double size = math::cbrt(std::abs(linear.determinant()));
+        const double side = (!block.skinned && block.mirrored) || (block.skinned && is_mirrored()) ? -1 : 1;
+        const Mat3d turn = side / std::max(size * size, 1e-30) * cofactor(linear);
+        std::vector<Vec3d> places(geometry.kept), normals(geometry.kept);
+        for (std::size_t t = 0; t < geometry.targets.size(); ++t) {
+            const gltf::MorphTarget& target = geometry.targets[t];
+            SkinMorph& morph = skin_.morphs[first + t];
+            std::ranges::fill(places, Vec3d::Zero());
+            std::ranges::fill(normals, Vec3d::Zero());
+            if (target.positions) target.positions->add_to(places, 0, geometry.kept, 1);
+            if (target.normals) target.normals->add_to(normals, 0, geometry.kept, 1);
+            has_normals_[first + t] = has_normals_[first + t] || target.normals.has_value();
+            for (std::size_t v = 0; v < geometry.kept; ++v) {
+                if (places[v].isZero(0) && normals[v].isZero(0)) continue;
+                morph.vertices.push_back(Index(block.first_vertex + v));
+                morph.positions.push_back((linear * places[v]).cast<float>());
+                morph.normals.push_back((turn * normals[v]).cast<float>());
+            }
+        }
+    }
+
+    /// A morph target is that of a node; its blocks follow each other.
+    void lay_out_morphs() {
+        std::vector<std::pair<std::size_t, std::size_t>> targets; // nodes, and numbers in their meshes
+        std::map<std::size_t, std::size_t> first_of;
+        for (const gltf::Block& block : scene_.blocks) {
+            const std::size_t count = scene_.geometries[block.geometry].targets.size();
+            const auto [first, is_new] = first_of.try_emplace(block.node, targets.size());
+            const gltf::Value names =
+                scene_.document->item("meshes", *scene_.nodes[block.node].mesh)["extras"]["targetNames"];
+            for (std::size_t t = 0; is_new && t < count; ++t) {
+                targets.emplace_back(block.node, t);
+                const bool is_named =
+                    names && names.json().is_array() && t < names.size() && names[t].json().is_string();
+                SkinMorph& morph = skin_.morphs.emplace_back();
+                morph.name = is_named ? names[t].text() : "morph " + std::to_string(targets.size());
+                morph.weight = rest_.weights[block.node][t];
+            }
+            has_normals_.resize(targets.size());
+            if (first->second + count <= targets.size()) add_targets(block, first->second);
+        }
+        for (std::size_t m = 0; m < targets.size(); ++m)
+            if (!has_normals_[m]) skin_.morphs[m].normals.clear();
+        for (std::size_t a = 0; a < scene_.animations.size() && !targets.empty(); ++a)
+            skin_.morph_weights.push_back([scene = kept_, a, targets](double seconds, std::span<double> weights) {
+                const gltf::Animation& animation = scene->animations[a];
+                const gltf::ScenePose pose =
+                    gltf::pose_at(*scene, animation, animation.summary.first_key + std::max(seconds, 0.0));
+                for (std::size_t m = 0; m < targets.size(); ++m)
+                    weights[m] = pose.weights[targets[m].first][targets[m].second];
+            });
+    }
+
     const gltf::Scene& scene_;
     std::shared_ptr<const gltf::Scene> kept_;
     const RunContext& context_;
@@ -336,6 +390,7 @@ private:
     std::map<std::size_t, std::vector<Index>> joints_of_; ///< of nodes
     std::map<std::size_t, Index> mesh_joints_;            ///< of nodes that carry a mesh without a skin
     std::vector<std::vector<Index>> numbers_;             ///< of each skin's joints
+    std::vector<bool> has_normals_;                       ///< of morph targets
     SkinnedMesh skin_;
 };
 
@@ -385,6 +440,14 @@ void skin_positions(const SkinnedMesh& skin, std::span<const Eigen::Affine3d> tr
     });
 }
 
+std::string check_morph(const SkinMorph& morph, std::size_t vertex_count) {
+    const std::size_t count = morph.vertices.size();
+    const bool fits = morph.positions.size() == count && (morph.normals.empty() || morph.normals.size() == count) &&
+                      std::ranges::is_sorted(morph.vertices, std::less_equal<>()) &&
+                      (count == 0 || morph.vertices.back() < vertex_count);
+    return fits ? "" : "The morph target '" + morph.name + "' is not of the mesh's vertices.";
+}
+
 std::string check_skin(const SkinnedMesh& skin) {
     if (std::string wrong = check_mesh(skin.mesh); !wrong.empty()) return wrong;
     const SkinWeights& w = skin.weights;
@@ -406,6 +469,11 @@ std::string check_skin(const SkinnedMesh& skin) {
         if (skin.joints[j].parent != kNoIndex && skin.joints[j].parent >= skin.joints.size())
             return "Joint " + std::to_string(j) + " has a parent that is no joint.";
     if (!skin.transforms) return "The skin has no transforms.";
+    if (!skin.morphs.empty() && skin.morph_weights.size() != skin.clips.size())
+        return "The skin has morph targets, and weights of them for " + std::to_string(skin.morph_weights.size()) +
+               " of " + std::to_string(skin.clips.size()) + " clips.";
+    for (const SkinMorph& morph : skin.morphs)
+        if (std::string wrong = check_morph(morph, skin.mesh.vertex_count()); !wrong.empty()) return wrong;
     return "";
 }
 

@@ -3,6 +3,7 @@
 
 #include "filigree/core/math.h"
 #include "filigree/io/gltf/glb_levels.h"
+#include "filigree/io/gltf/glb_morphs.h"
 #include "filigree/io/gltf/glb_parts.h"
 #include "filigree/io/gltf/glb_skeleton.h"
 #include "filigree/io/gltf/glb_skin_animation.h"
@@ -135,14 +136,18 @@ void add_influences(GlbBuilder& builder, const GlbParts& parts, const Skin& skin
 /// Puts one skinned file together.
 class SkinExport {
 public:
-    SkinExport(const Model& model, std::span<const NamedPoses> clips, const SkinOptions& options,
-               const RunContext& context)
-        : model_(model), clips_(clips), options_(options), context_(context), levels_(model, options.materials_beside) {
-    }
+    SkinExport(const Model& model, std::span<const NamedPoses> clips, std::span<const SkinMorph> morphs,
+               const SkinOptions& options, const RunContext& context)
+        : model_(model), clips_(clips), morphs_(morphs), options_(options), context_(context),
+          levels_(model, options.materials_beside) {}
 
     Result<ExportReport> write(const std::filesystem::path& path) {
         if (Status fine = check(); !fine) return fine.error();
         const unsigned level = restored_level(model_, options_.restore).value();
+        if (level < model_.finest_level() && !morphs_.empty()) {
+            morphs_ = {};
+            lost_morphs_ = true;
+        }
         Result<Restorer> restorer = Restorer::create(model_, options_.restore, context_);
         if (!restorer) return restorer.error();
         if (options_.compress) builder_.round_positions(bits_of_positions());
@@ -192,7 +197,9 @@ public:
             report_.normal_error_degrees =
                 std::max(report_.normal_error_degrees, clip.animation.normal_error_degrees());
         }
+        const std::vector<Json> weights = morph_channels(played, skin); // its bytes are part of what is measured
         if (Status measured = measure(played, *restorer); !measured) return measured.error();
+        move_morphs(played, weights);
         builder_.json["asset"] = {{"extras", {{"filigree", report_json()}}}};
         if (options_.compress)
             if (Status packed = builder_.compress(); !packed) return packed.error();
@@ -212,6 +219,7 @@ private:
 
     const Model& model_;
     std::span<const NamedPoses> clips_;
+    std::span<const SkinMorph> morphs_;
     const SkinOptions& options_;
     const RunContext& context_;
     GlbBuilder builder_;
@@ -219,7 +227,9 @@ private:
     GlbLevels levels_;
     std::optional<GlbSkeleton> skeleton_;
     std::vector<std::size_t> level_nodes_;
-    std::vector<std::string> lost_; ///< what glTF cannot hold
+    std::vector<std::size_t> morphed_nodes_; ///< of the finest level
+    std::vector<std::string> lost_;          ///< what glTF cannot hold
+    bool lost_morphs_ = false;
     WeightSteps weight_steps_ = WeightSteps::words;
     ExportReport report_;
 
@@ -233,6 +243,9 @@ private:
             for (std::size_t other = 0; other < c; ++other)
                 if (clips_[other].name == clips_[c].name)
                     return Error{ErrorCode::usage, "Two animations are called '" + clips_[c].name + "'."};
+        for (const SkinMorph& morph : morphs_)
+            if (const std::string wrong = check_morph(morph, model_.mesh.vertex_count()); !wrong.empty())
+                return Error{ErrorCode::usage, wrong};
         if (options_.influences != 3 && options_.influences != 6)
             return Error{ErrorCode::usage,
                          "A vertex of a skin has 3 or 6 influences, not " + std::to_string(options_.influences) + "."};
@@ -293,17 +306,25 @@ private:
         if (level_nodes_.empty()) lost_ = losses_of_played(parts.lost);
         const GlbMaterials& materials = levels_.add_materials(builder_, parts);
         Json attributes = add_glb_attributes(builder_, parts, mesh);
-        attributes["POSITION"] = builder_.add_positions(parts.spread(std::span<const Vec3f>(skin.positions)));
+        const bool is_finest = level_nodes_.empty();
+        const GlbMorphs morphs(is_finest ? morphs_ : std::span<const SkinMorph>(), skin.gradient_scale());
+        std::vector<Vec3f> positions = skin.positions;
+        morphs.take_out(positions);
+        attributes["POSITION"] = builder_.add_positions(parts.spread(std::span<const Vec3f>(positions)));
         add_influences(builder_, parts, skin, weight_steps_, attributes);
         const Json repeats = add_glb_repeats(builder_, parts);
+        std::vector<Json> entries;
         for (const GlbObject& object : parts.objects) {
             Json entry = add_glb_mesh(builder_, parts, object, materials, attributes);
             if (!repeats.is_null()) entry["extras"] = repeats;
             const std::string name = object.name.empty() ? "level " + std::to_string(level) : object.name;
-            if (level_nodes_.empty()) roots_.push_back(nodes_.size());
-            nodes_.push_back({{"name", name}, {"mesh", meshes_.size()}, {"skin", 0}});
-            meshes_.push_back(std::move(entry));
+            if (is_finest) roots_.push_back(nodes_.size());
+            if (is_finest) morphed_nodes_.push_back(nodes_.size());
+            nodes_.push_back({{"name", name}, {"mesh", meshes_.size() + entries.size()}, {"skin", 0}});
+            entries.push_back(std::move(entry));
         }
+        if (is_finest && !morphs_.empty()) morphs.add_targets(builder_, parts, !mesh.normals.empty(), entries);
+        for (Json& entry : entries) meshes_.push_back(std::move(entry));
         level_nodes_.push_back(nodes_.size() - 1);
         return Success{};
     }
@@ -357,7 +378,39 @@ private:
         builder_.json["scenes"] = Json::array({{{"nodes", std::move(roots_)}}});
         builder_.json["scene"] = 0;
         report_.warnings = levels_.warnings();
+        if (lost_morphs_)
+            report_.warnings.push_back("Morph targets move the vertices of the finest level; this coarser one is "
+                                       "written without them.");
         if (!lost_.empty()) report_.warnings.push_back(cannot_hold("A skinned GLB", lost_));
+    }
+
+    /// What morph targets do in each clip: an animation of their own.
+    std::vector<Json> morph_channels(std::span<const Played> played, const Skin& skin) {
+        std::vector<Json> channels(played.size());
+        for (std::size_t c = 0; c < played.size(); ++c)
+            GlbMorphs(morphs_, skin.gradient_scale())
+                .add_channels(builder_, played[c].clip, morphed_nodes_, channels[c]);
+        return channels;
+    }
+
+    /// Morph targets are at rest while the file is measured, as our restore does not know them.
+    void move_morphs(std::span<Played> played, std::span<const Json> channels) {
+        Json& animations = builder_.json["animations"];
+        for (std::size_t c = 0; c < played.size(); ++c) {
+            if (channels[c].is_null()) continue;
+            if (!played[c].number) {
+                animations.push_back(channels[c]);
+                continue;
+            }
+            Json& animation = animations[*played[c].number];
+            const std::size_t before = animation["samplers"].size();
+            for (const Json& sampler : channels[c]["samplers"]) animation["samplers"].push_back(sampler);
+            for (Json channel : channels[c]["channels"]) {
+                channel["sampler"] = before + channel["sampler"].get<std::size_t>();
+                animation["channels"].push_back(std::move(channel));
+            }
+        }
+        if (animations.is_null()) builder_.json.erase("animations");
     }
 
     /// Reads the file's own bytes and holds them against our restore: the worst of all animations.
@@ -431,10 +484,10 @@ private:
 } // namespace
 
 Result<ExportReport> write_skin_glb(const Model& model, std::span<const NamedPoses> animations,
-                                    const SkinOptions& options, const std::filesystem::path& path,
-                                    const RunContext& context) {
+                                    std::span<const SkinMorph> morphs, const SkinOptions& options,
+                                    const std::filesystem::path& path, const RunContext& context) {
     try {
-        return SkinExport(model, animations, options, context).write(path);
+        return SkinExport(model, animations, morphs, options, context).write(path);
     } catch (const std::bad_alloc&) {
         return Error{ErrorCode::out_of_memory, path.string() + ": does not fit into memory; export fewer keys."};
     }
@@ -443,7 +496,7 @@ Result<ExportReport> write_skin_glb(const Model& model, std::span<const NamedPos
 Result<ExportReport> write_skin_glb(const Model& model, const FrameSource<Pose>& poses, const SkinOptions& options,
                                     const std::filesystem::path& path, const RunContext& context) {
     const NamedPoses driver{"driver", poses};
-    return write_skin_glb(model, std::span(&driver, 1), options, path, context);
+    return write_skin_glb(model, std::span(&driver, 1), {}, options, path, context);
 }
 
 } // namespace filigree
