@@ -43,6 +43,9 @@ struct FitOptions {
     /// with sharp weights. Each takes three passes over the frames more. PackOptions::records keeps moved weights;
     /// other packed files lose them.
     unsigned weight_rounds = 0;
+    /// Whether gradients stay near the driver's own motion, so that viewers, which turn the normals of a skin by them,
+    /// shade it right. It follows less closely: 1.15 times the error with 24 vertices a driver vertex, 1.6 with 5.
+    bool sound_gradients = false;
 };
 
 /// Distances as fractions of the rest shape's diagonal.

@@ -377,6 +377,9 @@ TEST(Flesh, AllClipsBecomeOneModel) {
     EXPECT_EQ(fitted.poses[0].frames.front().positions, fitted.poses[0].frames.back().positions);
     EXPECT_EQ(fitted.report.frames, clips[0].frames.size() + clips[1].frames.size());
     EXPECT_LT(fitted.report.rms, 5e-3);
+    for (const PoseSequence& poses : fitted.poses) // viewers turn normals by the gradients
+        for (const Pose& pose : poses.frames)
+            for (const Mat3f& gradient : pose.gradients) EXPECT_GT(gradient.determinant(), 0.2f);
     EXPECT_EQ(fitted.animations()[1].name, "waves 2");
     EXPECT_EQ(fit_flesh(flesh, {}, 60).error().code, ErrorCode::usage);
     EXPECT_EQ(fit_flesh(flesh, clips, 3).error().code, ErrorCode::usage);

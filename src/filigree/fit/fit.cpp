@@ -84,6 +84,8 @@ struct Goal {
     }
 };
 
+PoseFitOptions pose_options(const FitOptions& options) { return {.refine = !options.sound_gradients}; }
+
 /// Some frames of the family's sample, in memory, on which drivers are tried.
 class Sample {
 public:
@@ -111,7 +113,7 @@ public:
         std::size_t vertices; ///< that the driver has
         AnimationError error;
     };
-    Result<Tried> try_driver(DriverChoice choice, std::size_t vertices, unsigned rounds,
+    Result<Tried> try_driver(DriverChoice choice, std::size_t vertices, const FitOptions& options,
                              const RunContext& context) const {
         Level driver = family_.sample_driver(choice, vertices);
         const std::size_t count = driver.vertices.size();
@@ -123,7 +125,8 @@ public:
             std::ranges::copy(frames_[k], positions.begin());
             return Success{};
         };
-        const Result<FittedPoses> fitted = fit_poses_and_weights(*model, frames_.size(), frame, rounds, context);
+        const Result<FittedPoses> fitted =
+            fit_poses_and_weights(*model, frames_.size(), frame, options.weight_rounds, pose_options(options), context);
         if (!fitted) return fitted.error();
         return Tried{count, fitted->error};
     }
@@ -240,7 +243,7 @@ Status FitWork::choose() {
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t k = 0; k < choices.size(); ++k) {
         if (Status ordered = family_->order(choices[k], shapes, silent_); !ordered) return ordered.error();
-        const Result<Sample::Tried> tried = sample_->try_driver(choices[k], size, options_.weight_rounds, silent_);
+        const Result<Sample::Tried> tried = sample_->try_driver(choices[k], size, options_, silent_);
         if (!tried) return tried.error();
         context_.report("choosing the driver", double(k + 1) / double(choices.size()));
         const double score = goal_.score(tried->error);
@@ -260,7 +263,7 @@ Result<std::size_t> FitWork::size_on_sample() {
     for (std::size_t tries = 0; tries < kMostSampleTries && !search.is_done(); ++tries) {
         context_.report("choosing the size", double(tries) / double(kMostSampleTries));
         const std::size_t size = search.next();
-        const Result<Sample::Tried> tried = sample_->try_driver(choice_, size, options_.weight_rounds, silent_);
+        const Result<Sample::Tried> tried = sample_->try_driver(choice_, size, options_, silent_);
         if (!tried) return tried.error();
         const double score = goal_.score(tried->error);
         if (score > 1 && size >= most_)
@@ -280,8 +283,8 @@ Result<Fitted> FitWork::fit_all(std::size_t vertices) {
     Result<Model> model = bind_to_levels(mesh_, family_->levels(choice_, vertices), work_, silent_);
     if (!model) return model.error();
     const std::vector<float> bound_u = model->detail.u, bound_v = model->detail.v;
-    Result<FittedPoses> poses =
-        fit_poses_and_weights(*model, animation_.frames, animation_.positions, options_.weight_rounds, context_);
+    Result<FittedPoses> poses = fit_poses_and_weights(*model, animation_.frames, animation_.positions,
+                                                      options_.weight_rounds, pose_options(options_), context_);
     if (!poses) return poses.error();
     ++tries_;
     Fitted fitted;

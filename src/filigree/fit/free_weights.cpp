@@ -181,13 +181,13 @@ Result<std::size_t> move_weights(Model& model, std::span<const Pose> poses, cons
 }
 
 Result<FittedPoses> fit_poses_and_weights(Model& model, std::size_t frames, const FrameReader& frame, unsigned rounds,
-                                          const RunContext& context) {
-    Result<FittedPoses> best = fit_poses(model, frames, frame, {}, context);
+                                          const PoseFitOptions& options, const RunContext& context) {
+    Result<FittedPoses> best = fit_poses(model, frames, frame, options, context);
     for (unsigned round = 0; best && round < rounds; ++round) {
         const std::vector<float> u = model.detail.u, v = model.detail.v;
         const Result<std::size_t> moved = move_weights(model, best->poses, frame, context);
         if (!moved) return moved.error();
-        Result<FittedPoses> again = fit_poses(model, frames, frame, {}, context);
+        Result<FittedPoses> again = fit_poses(model, frames, frame, options, context);
         if (!again) return again.error();
         const bool is_better = again->error.rms < best->error.rms;
         const bool goes_on = again->error.rms < kWorthARound * best->error.rms;

@@ -21,6 +21,6 @@ Result<std::size_t> move_weights(Model& model, std::span<const Pose> poses, cons
 /// Fits poses, then moves weights and fits again, `rounds` times or until little is won. Weights of a round that makes
 /// the error larger are taken back.
 Result<FittedPoses> fit_poses_and_weights(Model& model, std::size_t frames, const FrameReader& frame, unsigned rounds,
-                                          const RunContext& context);
+                                          const PoseFitOptions& options, const RunContext& context);
 
 } // namespace filigree

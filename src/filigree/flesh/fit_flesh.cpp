@@ -65,7 +65,8 @@ Result<FittedFlesh> fit_flesh(const Flesh& flesh, std::span<const FleshClip> cli
                                          carrier->at(clips[clip], frame - first[clip], positions, {}, silent);
                                          return Success{};
                                      }};
-    Result<Fitted> made = fit_animation(animation, {.base = std::min(joints, places)}, context);
+    Result<Fitted> made =
+        fit_animation(animation, {.base = std::min(joints, places), .sound_gradients = true}, context);
     if (!made) return made.error();
     FittedFlesh fitted{std::move(made->model), different_names(clips), {}, made->report, flesh.skin().morphs, {}};
     for (std::size_t c = 0; c < clips.size(); ++c) {
