@@ -4,7 +4,7 @@
 // With PICTURE.png it does nothing but to make docs/pictures/site.jpg: the koala, bent by hand, with its error as colours.
 import { mkdtempSync, rmSync, truncateSync, writeFileSync, readFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
-import { join } from 'node:path';
+import { basename, join } from 'node:path';
 import { open_browser, serve } from '../exchange/browser.mjs';
 import { fail } from '../exchange/tools.mjs';
 
@@ -59,6 +59,16 @@ async function settled(action) {
   return page.evaluate(() => (document.getElementById('failure').hidden ? '' : document.getElementById('failure-cause').textContent));
 }
 const give = (path) => settled(() => page.setInputFiles('#file', path));
+/// A text file, dragged from a folder and dropped on the page.
+const let_go = (path) => settled(() => page.evaluate(({ name, text }) => {
+  const dataTransfer = new DataTransfer();
+  dataTransfer.items.add(new File([text], name));
+  const send = (type) => document.body.dispatchEvent(new DragEvent(type, { dataTransfer, bubbles: true, cancelable: true }));
+  send('dragenter');
+  if (document.getElementById('target').hidden) throw new Error('the page does not say that a file can be dropped');
+  send('dragover');
+  send('drop');
+}, { name: basename(path), text: readFileSync(path, 'utf8') }));
 const until = (condition) => page.waitForFunction(condition, null, { timeout: kWait, polling: 30 }).catch(() => check(false, `never: ${condition}`));
 const is_quiet = () => window.filigree.bent && !window.filigree.waits_for_bend && !window.filigree.wanted && !window.filigree.is_new;
 const hold_still = (is_still) => page.evaluate((is_still) => { window.is_still = is_still; }, is_still);
@@ -177,7 +187,9 @@ async function use() {
   check(readFileSync(await download.path()).subarray(0, 8).toString() === 'FILIGREE', 'what is saved is no model');
 
   // More meshes, good and bad: a body each, or one sentence. What was there stays.
-  for (const name of ['good/moon.glb', 'good/featuretype.STL', 'good/torus.obj', 'bad/draco/test_extra_whitespace.ply'])
+  check(await let_go(join(corpus, 'good/torus.obj')) === '' && (await pixels()).count > 500, 'a file that is dropped on the page is not shown');
+  check(await page.textContent('#title') === 'torus.obj', 'the page does not show the name of the file');
+  for (const name of ['good/moon.glb', 'good/featuretype.STL', 'bad/draco/test_extra_whitespace.ply'])
     check(await give(join(corpus, name)) === '' && (await pixels()).count > 500, `${name} is not shown`);
   const stl = readFileSync(join(corpus, 'good/featuretype.STL'));
   const refused = [[made('cut.stl', stl.subarray(0, 3000)), /cut\.stl/], [made('nan.obj', 'v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n'), /nan\.obj/],
