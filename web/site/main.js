@@ -77,15 +77,16 @@ class Site {
     this.show();
   }
 
-  /// Asks a worker, and waits for an answer of a kind.
+  /// Asks a worker, and waits for an answer of a kind. Whoever else listens to the worker goes on.
   ask(worker, message, kind, moved = []) {
     return new Promise((resolve, reject) => {
-      worker.onerror = () => reject(new Error('This browser does not run the page (WebAssembly with SIMD); try a newer one.'));
-      worker.onmessage = ({ data }) => {
+      const end = new AbortController(), over = (action, value) => (end.abort(), action(value));
+      worker.onerror = () => over(reject, new Error('This browser does not run the page (WebAssembly with SIMD); try a newer one.'));
+      worker.addEventListener('message', ({ data }) => {
         if (data.kind === 'progress') this.phase(data);
-        else if (data.kind === 'failed') reject(new Error(data.message));
-        else if (data.kind === kind) resolve(data);
-      };
+        else if (data.kind === 'failed') over(reject, new Error(data.message));
+        else if (data.kind === kind) over(resolve, data);
+      }, { signal: end.signal });
       worker.postMessage(message, moved);
     });
   }
@@ -93,6 +94,7 @@ class Site {
   async toggle_breaks() {
     if (!this.maker || this.maker_next || !element('loading').hidden) return;
     const asked = ++this.runs;
+    this.say('Filling it with particles');
     try {
       await this.make(this.maker, { name: this.name, read: this.read, breaks: !this.breaks, mode: 'drop', asked });
     } catch (cause) {
