@@ -31,6 +31,14 @@ FollowOptions options() {
     return {.direction = view_direction(View::iso, UpAxis::y), .up = Vec3d::UnitY(), .aspect = kAspect};
 }
 
+/// One camera that sees all frames.
+Camera still_camera(const std::vector<std::vector<Vec3f>>& points) {
+    std::vector<Vec3f> all;
+    for (const auto& frame : points) all.insert(all.end(), frame.begin(), frame.end());
+    const CameraPoints everything{all};
+    return fit_camera(std::span(&everything, 1), options().direction, Vec3d::UnitY(), kAspect);
+}
+
 TEST(FollowCamera, SeesEveryFrameFromOneDirectionAndCloser) {
     const auto points = bouncing(5);
     const std::vector<Camera> cameras = follow_cameras(points, options());
@@ -45,10 +53,7 @@ TEST(FollowCamera, SeesEveryFrameFromOneDirectionAndCloser) {
         }
         nearest = std::min(nearest, (camera.eye - camera.target).norm());
     }
-    std::vector<Vec3f> all;
-    for (const auto& frame : points) all.insert(all.end(), frame.begin(), frame.end());
-    const CameraPoints everything{all};
-    const Camera still = fit_camera(std::span(&everything, 1), options().direction, Vec3d::UnitY(), kAspect);
+    const Camera still = still_camera(points);
     EXPECT_LT(nearest, 0.6 * (still.eye - still.target).norm());
 }
 
@@ -66,6 +71,8 @@ TEST(FollowCamera, FollowsInAFilmOfASecondToo) {
     const std::vector<Camera> cameras = follow_cameras(points, options());
     ASSERT_EQ(cameras.size(), 60U);
     EXPECT_GT((cameras.back().eye - cameras.front().eye).norm(), 3);
+    const Camera still = still_camera(points);
+    EXPECT_LT((cameras[30].eye - cameras[30].target).norm(), 0.65 * (still.eye - still.target).norm());
 }
 
 TEST(FollowCamera, StandsStillWhereThatShowsAsMuch) {

@@ -9,7 +9,7 @@ namespace filigree {
 namespace {
 
 constexpr double kAhead = 0.75;  // s that a camera looks ahead and back
-constexpr double kPart = 0.375;  // of a short film that it looks ahead and back: else it would see all of it at once
+constexpr double kPart = 0.25;   // of a short film that it looks ahead and back: else it would see all of it at once
 constexpr double kCloser = 1.35; // by so much the picture has to gain, else the camera stands still
 
 double distance_of(const Camera& camera) { return (camera.eye - camera.target).norm(); }
