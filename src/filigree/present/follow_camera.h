@@ -17,8 +17,8 @@ struct FollowOptions {
 };
 
 /// One camera a frame: each sees all points of its frame, and moves as evenly as a second and a half around the frame
-/// allow, or half of a film of less than three seconds. One camera for all frames where a following one would come hardly
-/// closer. points: of each frame, at least one frame. Cost O(frames of a second and a half times all points).
+/// allow, or half of a film of less than three seconds. One camera for all frames where a following one would come
+/// hardly closer. points: of each frame, at least one frame. Cost O(frames of a second and a half times all points).
 std::vector<Camera> follow_cameras(std::span<const std::vector<Vec3f>> points, const FollowOptions& options);
 
 } // namespace filigree
