@@ -285,9 +285,14 @@ private:
         report_.row("clip", fmt::format("'{}', {} frames at {:.4g} a second, {} a frame, {} substeps at most",
                                         fitted_.names[c], clip.frames.size(), clip.frames_per_second,
                                         seconds_text(clip.step_seconds + clip.target_seconds), clip.most_substeps));
-        report_.row("  volume", fmt::format("{:.3f} .. {:.3f} of the bind pose's; the skin alone: {:.3f} .. {:.3f}",
-                                            m.least_volume, m.most_volume, m.skin_least_volume, m.skin_most_volume));
-        if (!options_.no_check)
+        const bool has_volume = m.is_closed || m.most_volume > m.least_volume;
+        if (!has_volume)
+            report_.row("  volume", "none: the surface is open and encloses nothing");
+        else
+            report_.row("  volume",
+                        fmt::format("{:.3f} .. {:.3f} of the bind pose's; the skin alone: {:.3f} .. {:.3f}",
+                                    m.least_volume, m.most_volume, m.skin_least_volume, m.skin_most_volume));
+        if (!options_.no_check && has_volume)
             report_.row("  overlap", fmt::format("{:.1e} of the volume; the skin alone: {:.1e}",
                                                  std::max(0.0, m.overlap), std::max(0.0, m.skin_overlap)));
         report_.row("  from the skin", fmt::format("{:.3f} of the diagonal at most, at '{}' in frame {}", m.furthest,

@@ -16,7 +16,9 @@ from walking_man import X, Y, Z, rotation, times
 # %% Its surface: metres, y up, it looks along z
 EYES = np.array([[-0.043, 0.024, 0.082], [0.043, 0.024, 0.082]])
 EYE, MOUTH, CHIN_HINGE = 0.028, np.array([0, -0.066, 0.1]), np.array([0, -0.015, -0.01])
-OPEN_LOW, OPEN_HIGH, LID_HIGH = np.radians([-24, 38, 78])  # of the eyes, seen from their middles
+OPEN_LOW, OPEN_HIGH, OPEN_WIDE = np.radians([-24, 28, 58])  # of the eyes, seen from their middles
+# A rim of skin moves with the eyes: what is white lies behind the lids when they are shut.
+RIM_LOW, RIM_HIGH, RIM_WIDE, LID_HIGH = np.radians([-34, 36, 72, 86])
 HEAD = [  # ends and radii of capsules
     ((0, 0.045, -0.03), (0, 0.03, 0.0), 0.105), ((-0.02, -0.02, 0.02), (0.02, -0.02, 0.02), 0.085),
     ((0, -0.095, 0.045), (0, -0.09, 0.055), 0.036), ((-0.035, -0.112, 0.005), (0.035, -0.112, 0.005), 0.045),
@@ -77,15 +79,16 @@ def targets(places):
 
     for name, eye in zip(("BlinkRight", "BlinkLeft"), EYES):
         up, side, far = eye_angles(places, eye)
-        wide = np.clip(1 - (side / np.radians(62)) ** 2, 0, 1) ** 0.5
-        high, top = OPEN_HIGH * wide, LID_HIGH * np.maximum(wide, 0.3)
-        low = OPEN_LOW * wide
-        shut = low + 0.06 * (high - low)
+        wide = np.clip(1 - (side / RIM_WIDE) ** 2, 0, 1) ** 0.5
+        high, top = RIM_HIGH * wide, LID_HIGH * np.maximum(wide, 0.3)
+        low = RIM_LOW * wide
+        shut = low + 0.1 * (high - low)
         t = np.where(up <= high, (up - low) / np.maximum(high - low, 1e-6), 1 + (up - high) / np.maximum(top - high, 1e-6))
         goes = np.where(t <= 1, low + t * (shut - low), shut + (t - 1) * (top - shut))
         near = smooth((1.45 * EYE - far) / (0.3 * EYE)) * (t > 0) * (t < 2) * (wide > 0) * (places[:, 2] > eye[2])
         radius = np.hypot(places[:, 1] - eye[1], places[:, 2] - eye[2])
-        lid = np.where(t > 1, 1.03, 1.0)  # over the ball
+        # The lid goes over the ball; what was open folds behind it, so that no rim of it is seen between both lids.
+        lid = 1 - 0.15 * smooth(t / 0.3) + 0.18 * smooth((t - 0.85) / 0.2)
         there = np.stack([x, eye[1] + lid * radius * np.sin(goes), eye[2] + lid * radius * np.cos(goes)], -1)
         moves[name] = near[:, None] * (there - places)
     return moves
@@ -105,7 +108,7 @@ def colors(places):
     paint[inside & (z < 0.1)] = [0.12, 0.01, 0.015]
     for eye in EYES:
         up, side, far = eye_angles(places, eye)
-        wide = np.clip(1 - (side / np.radians(62)) ** 2, 0, 1) ** 0.5
+        wide = np.clip(1 - (side / OPEN_WIDE) ** 2, 0, 1) ** 0.5
         ball = (far < 1.04 * EYE) & (up > OPEN_LOW * wide) & (up < OPEN_HIGH * wide) & (z > eye[2])
         paint[ball] = [0.9, 0.9, 0.88]
         from_pupil = np.hypot(up - np.radians(6), side)

@@ -253,7 +253,9 @@ struct FleshMeasure {
     double furthest = 0; ///< of a vertex from the skin, fraction of the diagonal
     std::size_t furthest_frame = 0;
     Index furthest_joint = kNoIndex; ///< that carries most of that vertex
-    bool is_closed = true;           ///< volumes of an open surface are those of the cones from its middle
+    /// Volumes of an open surface are those of the cones from a point of it; of one that encloses nothing, such as a
+    /// sheet, they stay 1 and overlaps 0.
+    bool is_closed = true;
 };
 /// overlap_frames: how many frames are looked at for overlaps, 0: none. Cost O(V) a frame. Errors: cancelled.
 Result<FleshMeasure> measure_flesh(const Flesh& flesh, const FleshClip& clip, std::size_t overlap_frames = 4,

@@ -255,6 +255,24 @@ TEST(Flesh, ASurfaceWithoutJointsIsFollowedToo) {
     EXPECT_NE(skin_of_surface(std::move(lost), 100).error().message.find("not finite"), std::string::npos);
 }
 
+/// A flag encloses nothing.
+TEST(Flesh, ASheetHasNoVolume) {
+    const Mesh sheet = make_shape("wavy-plane", {.resolution = 16, .amplitude = 0}).value();
+    MovingSurface surface{.rest = sheet, .clips = {{"waves", 0.2}}, .positions = {}};
+    surface.positions = [&](std::size_t, double t, std::span<Vec3f> out) -> Status {
+        for (std::size_t v = 0; v < out.size(); ++v)
+            out[v] = sheet.positions[v] + Vec3f(0, 0, float(0.1 * math::sin(5 * double(sheet.positions[v].x()) + t)));
+        return Success{};
+    };
+    const Flesh flesh = Flesh::create(skin_of_surface(std::move(surface), 40).value(), kSmall).value();
+    const FleshMeasure m = measure_flesh(flesh, simulate_flesh(flesh, 0, kThirty).value(), 2).value();
+    EXPECT_FALSE(m.is_closed);
+    EXPECT_EQ(m.least_volume, 1);
+    EXPECT_EQ(m.skin_most_volume, 1);
+    EXPECT_EQ(m.overlap, 0);
+    EXPECT_GT(m.furthest, 0);
+}
+
 /// A blink is finer than the particles: it lies on top of them, and turns with them.
 TEST(Flesh, WhatASurfaceDoesBetweenParticlesLiesOnTop) {
     const Mesh rest = tube(kCoarse, 1, waving(0, 1)).mesh;

@@ -60,13 +60,11 @@ def test_all_clips_leave_as_one_file(skin, tmp_path):
     flesh = filigree.Flesh(skin, particles=400, poisson_ratio=0.3)
     assert flesh.body.material.poisson_ratio == pytest.approx(0.3)
     assert flesh.stretches("Walk", 0.3) is None
-    model, poses, said = flesh.export(tmp_path / "soft.glb", frames_per_second=24, joints=40)
+    model, poses, said = flesh.export(tmp_path / "soft.glb", frames_per_second=12, joints=40)
     assert list(poses) == list(said) == ["Walk", "Jump"]
-    assert len(poses["Walk"]) == 27 and said["Jump"]["clamped_particles"] == 0
+    assert len(poses["Walk"]) == 14 and said["Jump"]["clamped_particles"] == 0
     assert model.report["frames"] == len(poses["Walk"]) + len(poses["Jump"]) and model.report["rms"] < 5e-3
     assert [name for name, _ in filigree.read_skin(tmp_path / "soft.glb").clips] == ["Walk", "Jump"]
-    with pytest.raises(filigree.UsageError, match="12 joints"):
-        flesh.export(tmp_path / "few.glb", ["Jump"], frames_per_second=24, joints=3)
     with pytest.raises(filigree.UsageError):
         filigree.Flesh(skin, particles=400, poisson_ratio=0.7)
 

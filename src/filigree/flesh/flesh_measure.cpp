@@ -12,6 +12,7 @@ namespace filigree {
 
 namespace {
 
+constexpr double kLeastVolume = 1e-4;  ///< of the diagonal's cube: an open surface of less encloses nothing
 constexpr double kOverlapStep = 0.125; ///< spacings, between the lines that are looked at for overlaps
 
 /// Of the cones from a point near by, so that it keeps its digits.
@@ -138,8 +139,12 @@ Result<FleshMeasure> measure_flesh(const Flesh& flesh, const FleshClip& clip, st
     const double step = kOverlapStep * flesh.body()->spacing() / flesh.scale();
     FleshMeasure measure;
     measure.is_closed = is_closed(flesh.surface().positions, triangles);
-    measure.least_volume = measure.skin_least_volume = 1e9;
-    measure.most_volume = measure.skin_most_volume = -1e9;
+    const bool has_volume = measure.is_closed || std::abs(rest) > kLeastVolume * diagonal * diagonal * diagonal;
+    if (has_volume) {
+        measure.least_volume = measure.skin_least_volume = 1e9;
+        measure.most_volume = measure.skin_most_volume = -1e9;
+    }
+    if (!has_volume) overlap_frames = 0;
     double bind = 0;
     if (overlap_frames > 0) {
         bind = overlap_of(flesh.surface().positions, triangles, step, context);
@@ -153,11 +158,13 @@ Result<FleshMeasure> measure_flesh(const Flesh& flesh, const FleshClip& clip, st
         carrier->at(clip, frame, soft, {}, context);
         const double seconds = std::min(double(frame) / clip.frames_per_second, skin.clips[clip.clip].seconds);
         if (Status placed = clip_positions(skin, clip.clip, seconds, plain, context); !placed) return placed.error();
-        const double now = volume_of(soft, triangles) / rest, of_skin = volume_of(plain, triangles) / rest;
-        measure.least_volume = std::min(measure.least_volume, now);
-        measure.most_volume = std::max(measure.most_volume, now);
-        measure.skin_least_volume = std::min(measure.skin_least_volume, of_skin);
-        measure.skin_most_volume = std::max(measure.skin_most_volume, of_skin);
+        if (has_volume) {
+            const double now = volume_of(soft, triangles) / rest, of_skin = volume_of(plain, triangles) / rest;
+            measure.least_volume = std::min(measure.least_volume, now);
+            measure.most_volume = std::max(measure.most_volume, now);
+            measure.skin_least_volume = std::min(measure.skin_least_volume, of_skin);
+            measure.skin_most_volume = std::max(measure.skin_most_volume, of_skin);
+        }
         for (std::size_t v = 0; v < count; ++v) {
             if (flesh.left_out()[v]) continue;
             const double way = double((soft[v] - plain[v]).norm()) / diagonal;
