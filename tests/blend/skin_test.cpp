@@ -7,6 +7,7 @@
 #include "threads.h"
 
 #include <gtest/gtest.h>
+#include <numbers>
 #include <random>
 #include <set>
 
@@ -142,11 +143,11 @@ Mat3d matrix_of(const NestedRotations& parts) {
 }
 
 Mat3d rotation(double degrees, const Vec3d& axis) {
-    return Eigen::AngleAxisd(degrees * M_PI / 180, axis.normalized()).toRotationMatrix();
+    return Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis.normalized()).toRotationMatrix();
 }
 
 double turn_degrees(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
-    return 2 * std::acos(std::min(1.0, std::abs(a.dot(b)))) * 180 / M_PI;
+    return 2 * std::acos(std::min(1.0, std::abs(a.dot(b)))) * 180 / std::numbers::pi;
 }
 
 /// A joint that turns by `degrees` and stretches by up to `stretch` while its own axes turn the other way.

@@ -6,6 +6,7 @@
 #include "filigree/mesh.h"
 #include "threads.h"
 
+#include <numbers>
 #include <random>
 
 using namespace filigree_test;
@@ -253,7 +254,8 @@ TEST(Strip, OptionsThatMakeNoSenseAreRefused) {
 TEST(Strip, NoVertexIsBoundFarFromTheClosestCell) {
     const Model model = stripped(make_wavy_cube({.resolution = 48}), {.base = 400}).model;
     const Deformation twist{[](const Vec3d& p) {
-                                const double c = std::cos(M_PI * p[2]), s = std::sin(M_PI * p[2]);
+                                const double c = std::cos(std::numbers::pi * p[2]),
+                                             s = std::sin(std::numbers::pi * p[2]);
                                 return Vec3d(c * p[0] - s * p[1], s * p[0] + c * p[1], p[2]);
                             },
                             [](const Vec3d&) { return Mat3d(Mat3d::Identity()); }};

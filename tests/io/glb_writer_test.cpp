@@ -1,5 +1,6 @@
 // What a GLB of a mesh that stands still holds, looked at with nothing of ours but the JSON parser.
 #include "filigree/file.h"
+#include "new_folder.h"
 #include "sample_meshes.h"
 
 #include <gtest/gtest.h>
@@ -9,8 +10,7 @@
 #include <cstring>
 #include <ctime>
 #include <fstream>
-
-#include <unistd.h>
+#include <numbers>
 
 using namespace filigree;
 using filigree_test::make_corner_attribute_mesh;
@@ -245,8 +245,7 @@ TEST(GlbWriter, PicturesLoseWhatGltfIgnores) {
 }
 
 TEST(GlbWriter, LibrariesBesideTheMeshAreEmbedded) {
-    std::string name = (fs::temp_directory_path() / "filigree-XXXXXX").string();
-    const fs::path folder = ::mkdtemp(name.data());
+    const fs::path folder = new_folder();
     std::ofstream(folder / "m.mtl") << "newmtl wood\nKd 1 0 0\nd 0.5\nPr 0.25\nPm 1\nmap_Kd wood.png\n";
     std::ofstream(folder / "wood.png", std::ios::binary) << kPicture;
     Mesh mesh = square();
@@ -321,7 +320,7 @@ TEST(GlbWriter, GltfWithFilesBesideItIsNotWritten) {
 TEST(GlbWriter, LargeFacesAndHubsWithSeamsTakeLinearTime) {
     constexpr Index kCorners = 50'000; // squared, these would take half a minute
     const auto circle = [](Index v) {
-        const double angle = 2 * M_PI * double(v) / kCorners;
+        const double angle = 2 * std::numbers::pi * double(v) / kCorners;
         return Vec3f(float(std::cos(angle)), float(std::sin(angle)), 0);
     };
     Mesh polygon, fan;

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 using namespace filigree;
 using namespace filigree_test;
@@ -80,7 +81,7 @@ TEST(GltfAnimation, RotationsTurnTheShortWay) {
     // 90 degrees about z; the second key is the negative of the same rotation's quaternion
     const GltfScene scene =
         moved(keys({0, 1}, {0, 0, 0, 1, 0, 0, -half, -half}, "VEC4"), "rotation", R"("interpolation":"LINEAR")");
-    const double third = M_PI / 6;
+    const double third = std::numbers::pi / 6;
     expect_near(positions_at(scene, 1.0 / 3)[1], {std::cos(third), std::sin(third), 0});
 }
 
@@ -187,8 +188,9 @@ TEST(GltfAnimation, ASkinOfTheCorpus) {
         return Vec3d((1 - weight) * Vec3d(x, p.y(), 0) + weight * turned);
     };
     const double eighth = 2 * std::atan2(0.382999986410141, 0.9240000247955322); // the key at 0.5 s
-    for (const auto& [seconds, angle] : {std::pair(0.0, 0.0), std::pair(0.5, eighth), std::pair(0.25, eighth / 2),
-                                         std::pair(1.0, M_PI / 2), std::pair(4.25, -M_PI / 2), std::pair(7.0, 0.0)}) {
+    for (const auto& [seconds, angle] :
+         {std::pair(0.0, 0.0), std::pair(0.5, eighth), std::pair(0.25, eighth / 2),
+          std::pair(1.0, std::numbers::pi / 2), std::pair(4.25, -std::numbers::pi / 2), std::pair(7.0, 0.0)}) {
         const std::vector<Vec3f> positions = positions_at(*scene, seconds);
         for (int v = 0; v < 10; ++v)
             expect_near(positions[static_cast<std::size_t>(v)],

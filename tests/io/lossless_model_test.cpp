@@ -1,6 +1,7 @@
 // Lossless model files: byte for byte the plain file, whatever the model; parts of it are read as from a plain one.
 #include "coded_size.h"
 #include "corpus.h"
+#include "new_folder.h"
 #include "sample_meshes.h"
 #include "threads.h"
 
@@ -14,7 +15,6 @@
 #include "filigree/restore.h"
 #include "filigree/strip.h"
 
-#include <cstdlib>
 #include <gtest/gtest.h>
 
 using namespace filigree;
@@ -33,8 +33,7 @@ PoseSequence bending(const Model& model, std::size_t frames, bool with_gradients
 }
 
 std::string lossless_file(const Model& model, const PoseSequence& poses, std::uint64_t* plain = nullptr) {
-    std::string name = (std::filesystem::temp_directory_path() / "filigree-lossless-XXXXXX").string();
-    const std::filesystem::path folder = ::mkdtemp(name.data()), path = folder / "it.fil";
+    const std::filesystem::path folder = new_folder(), path = folder / "it.fil";
     const LosslessPackReport report = pack_model_lossless(model, poses, path, kTwoThreads).value();
     if (plain) *plain = report.plain;
     std::string bytes = read_file(path).value();

@@ -8,6 +8,7 @@
 #include "filigree/restore.h"
 #include "filigree/strip.h"
 #include "io/sample_meshes.h"
+#include "new_folder.h"
 #include "threads.h"
 
 #include <gtest/gtest.h>
@@ -17,9 +18,6 @@
 #include <cstring>
 #include <fstream>
 #include <random>
-
-#include <sys/stat.h>
-#include <unistd.h>
 
 namespace model_file_test {
 
@@ -506,8 +504,7 @@ TEST(ModelFile, AnOutlineReadsNothingElse) {
 }
 
 TEST(ModelFile, WritingFailsWithoutHarm) {
-    std::string name = (fs::temp_directory_path() / "filigree-XXXXXX").string();
-    const fs::path folder = ::mkdtemp(name.data());
+    const fs::path folder = new_folder();
     const Model model = small_models()[0];
     ASSERT_TRUE(write_file(folder / "a.fil", "old").ok());
     for (const fs::path& path : {folder / "missing" / "a.fil", folder}) {

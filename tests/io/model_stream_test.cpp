@@ -5,10 +5,10 @@
 
 #include "filigree/mesh.h"
 #include "filigree/strip.h"
+#include "new_folder.h"
 #include "threads.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <gtest/gtest.h>
 
 namespace model_stream_test {
@@ -34,8 +34,7 @@ PoseSequence turning(const Model& model, std::size_t frames) {
 }
 
 std::string frames_of(const Model& model, const PoseSequence& poses) {
-    std::string name = (std::filesystem::temp_directory_path() / "filigree-stream-XXXXXX").string();
-    const std::filesystem::path folder = ::mkdtemp(name.data()), path = folder / "stream.fil";
+    const std::filesystem::path folder = new_folder(), path = folder / "stream.fil";
     pack_model(model, poses, {.levels = true}, path, kTwoThreads).value();
     std::string bytes = read_file(path).value();
     std::filesystem::remove_all(folder);
