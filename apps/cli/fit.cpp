@@ -311,6 +311,8 @@ Command fit_command() {
                        Option("--free-weights", options->free_weights,
                               "Move weights with --profile compact too: smaller for characters, larger for cloth")
                            .excludes({"--bound-weights"}),
+                       Option("--sound-gradients", options->fit.sound_gradients,
+                              "Keep gradients near the driver's own motion: better normals in viewers, less close"),
                        Option("--bits", options->bits,
                               "With --profile compact, stream or runtime: bits of a position (default: by the error)")
                            .between(10, 16),

@@ -802,6 +802,7 @@ def fit(
     base: int | None = None,
     rest_frame: int | str | None = None,
     frames_per_second: float = 60.0,
+    sound_gradients: bool = False,
     threads: int = 0,
     progress: _Progress | None = None,
 ) -> Fitted: ...

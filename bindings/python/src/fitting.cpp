@@ -69,12 +69,12 @@ py::dict said_of(const FitReport& report) {
 
 py::object fit(const py::object& given, const py::object& positions, double error, std::optional<double> max_error,
                std::optional<std::size_t> base, const py::object& rest_frame, double frames_per_second,
-               unsigned threads, const py::object& progress) {
+               bool sound_gradients, unsigned threads, const py::object& progress) {
     if (!(frames_per_second > 0)) refuse("frames_per_second has to be above 0.");
     const Frames frames(mesh_of(given), positions);
     const MeshAnimation animation{frames.mesh.get(), frames.count, frames_per_second,
                                   [&](std::size_t frame, std::span<Vec3f> out) { return frames.read(frame, out); }};
-    FitOptions options{.error = error, .max_error = max_error, .base = base};
+    FitOptions options{.error = error, .max_error = max_error, .base = base, .sound_gradients = sound_gradients};
     const bool chooses_rest = py::isinstance<py::str>(rest_frame);
     if (chooses_rest && rest_frame.cast<std::string>() != "best")
         refuse("rest_frame has to be a number, 'best' or None.");
@@ -93,8 +93,9 @@ void add_fitting(py::module_& m) {
     m.def(
         "fit", &fit, py::arg("mesh"), py::arg("positions"), py::kw_only(), py::arg("error") = 1e-4,
         py::arg("max_error") = py::none(), py::arg("base") = py::none(), py::arg("rest_frame") = py::none(),
-        py::arg("frames_per_second") = 60.0, py::arg("threads") = 0, py::arg("progress") = py::none(),
-        R"(fit(mesh, positions, *, error=0.0001, max_error=None, base=None, rest_frame=None, frames_per_second=60.0, threads=0, progress=None)
+        py::arg("frames_per_second") = 60.0, py::arg("sound_gradients") = false, py::arg("threads") = 0,
+        py::arg("progress") = py::none(),
+        R"(fit(mesh, positions, *, error=0.0001, max_error=None, base=None, rest_frame=None, frames_per_second=60.0, sound_gradients=False, threads=0, progress=None)
 --
 
 Find the smallest driver, and its poses, whose restored mesh follows an animation within an error.
@@ -118,6 +119,9 @@ rest_frame : int or 'best', optional
     The frame that is the rest shape, from 0; 'best': the one from which others are stretched least. None: the mesh.
 frames_per_second : float
     Above 0.
+sound_gradients : bool
+    Keep gradients near the driver's own motion, so that viewers, which turn normals by them, shade a skin right. It
+    follows less closely.
 
 Returns
 -------

@@ -24,6 +24,23 @@ def rms(model, poses, frames):
     return numpy.sqrt(numpy.mean(squared)) / model.report["diagonal_units"]
 
 
+def test_gradients_stay_sound():
+    """A bar that is twisted, with twenty vertices for each of the driver's: nothing grows by a half."""
+    mesh = filigree.make("bar", resolution=8)
+    rest = numpy.array(mesh.world_vertices)
+    x, (y, z) = rest[:, 0], (rest - rest.mean(0)).T[1:]
+    part = numpy.clip(((x - x.min()) / numpy.ptp(x) - 0.4) / 0.2, 0, 1)
+    frames = []
+    for turn in numpy.radians([0, 40, 80, 120, 160])[:, None] * part:
+        frames.append(numpy.stack([x, numpy.cos(turn) * y - numpy.sin(turn) * z, numpy.sin(turn) * y + numpy.cos(turn) * z], 1))
+    most = {}
+    for sound in (False, True):
+        model, poses = filigree.fit(mesh, numpy.array(frames, dtype=numpy.float32), base=60, sound_gradients=sound)
+        most[sound] = max(numpy.linalg.det(numpy.asarray(pose.gradients)).max() for pose in poses)
+        assert model.report["rms"] < 2e-3
+    assert most[True] < 1.5 < most[False], most
+
+
 def test_an_error_is_reached():
     mesh = filigree.make("wavy-sphere", resolution=32)
     frames = waves(mesh)
