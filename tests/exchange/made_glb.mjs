@@ -19,8 +19,9 @@ function transformed({ translation, rotation, scale }, [x, y, z]) {
     return [c * sx - s * sy + translation[0], s * sx + c * sy + translation[1], sz + translation[2]];
 }
 
-/// { glb, pc2, vertices, keys, rate }: files as buffers. The frames of the PC2 are the keys.
-export function made_skin() {
+/// { glb, pc2, vertices, keys, rate }: files as buffers. The frames of the PC2 are the keys. morphs: a target that swells
+/// the tube, by a quarter at rest and more in the clip; the PC2 does not know it.
+export function made_skin(morphs = false) {
     const positions = [], normals = [], joints = [], weights = [], triangles = [], coarse = [];
     for (let ring = 0; ring < kRings; ++ring) {
         const v = ring / (kRings - 1);
@@ -56,6 +57,14 @@ export function made_skin() {
             [numbers(word), word === 'rotation' ? 'VEC4' : 'VEC3', 5126]),
         [Uint16Array.from(coarse.flat()), 'SCALAR', 5123, 34963],
     ];
+    if (morphs) {
+        const swells = Float32Array.from(positions.flatMap(([x, y, z]) => [0.5 * x * y, 0, 0.5 * z * y]));
+        parts.push([swells, 'VEC3', 5126, 34962, { min: axes(swells, Math.min), max: axes(swells, Math.max) }],
+            [Float32Array.from(normals.flatMap(() => [0, -0.2, 0])), 'VEC3', 5126, 34962],
+            [Float32Array.from(keys.map((key) => key / (kKeys - 1))), 'SCALAR', 5126]);
+    }
+    const target = morphs && { targets: [{ POSITION: 11, NORMAL: 12 }] };
+    const weights_of = morphs && { weights: [0.25], extras: { targetNames: ['swell'] } };
     const attributes = { POSITION: 0, NORMAL: 1, JOINTS_0: 2, WEIGHTS_0: 3 };
     const paths = ['translation', 'rotation', 'scale'];
     return {
@@ -65,12 +74,15 @@ export function made_skin() {
             nodes: [{ mesh: 0, skin: 0, extensions: { MSFT_lod: { ids: [4] } } },
                 { name: 'driver', children: [2, 3] }, {}, { translation: [0, 1, 0] }, { mesh: 1, skin: 0 }],
             extensionsUsed: ['MSFT_lod'],
-            meshes: [4, 10].map((indices) => ({ primitives: [{ attributes, indices, material: 0 }] })),
+            meshes: [4, 10].map((indices) => ({ primitives: [{ attributes, indices, material: 0, ...target }],
+                ...weights_of })),
             materials: [{ pbrMetallicRoughness: { metallicFactor: 0, roughnessFactor: 0.7 } }],
             skins: [{ joints: [2, 3], inverseBindMatrices: 5, skeleton: 1 }],
             animations: [{
-                channels: paths.map((path, i) => ({ sampler: i, target: { node: 3, path } })),
-                samplers: paths.map((_, i) => ({ input: 6, output: 7 + i })),
+                channels: [...paths.map((path, i) => ({ sampler: i, target: { node: 3, path } })),
+                    ...(morphs ? [{ sampler: 3, target: { node: 0, path: 'weights' } }] : [])],
+                samplers: [...paths.map((_, i) => ({ input: 6, output: 7 + i })),
+                    ...(morphs ? [{ input: 6, output: 13 }] : [])],
             }],
         }),
         pc2: pc2(moves.map((move) => positions.map((_, i) => {

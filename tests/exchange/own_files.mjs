@@ -4,6 +4,7 @@ import { execFileSync } from 'node:child_process';
 import { existsSync, mkdirSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { deflateSync } from 'node:zlib';
+import { made_skin } from './made_glb.mjs';
 import { root } from './tools.mjs';
 
 const [program, folder] = process.argv.slice(2);
@@ -64,6 +65,10 @@ filigree('export', ...moving, '-o', 'compressed.glb', '--compress');
 filigree('fit', 'moving.pc2', '--mesh', 'cube.ply', '--frame-rate', String(kRate), '--base', '100', '-o', 'fitted.fil',
     '-o', 'fitted.glb', '--full-precision');
 filigree('restore', 'fitted.fil', '--frames', '-o', 'fitted.pc2');
+
+// A skin with a morph target and a joint that stretches, as flesh.
+writeFileSync(join(folder, 'swelling.glb'), made_skin(true).glb);
+filigree('flesh', 'swelling.glb', '-o', 'flesh.glb', '--particles', '400', '--joints', '60', '--no-check');
 
 // Two objects, two materials and a UV seam: a tube of which each half is an object, its texture's ends at one edge.
 function tube(around, rings, library) {
