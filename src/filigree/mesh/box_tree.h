@@ -31,8 +31,8 @@ public:
 
     bool is_empty() const { return nodes_.empty(); }
 
-    /// `point` has to be finite. Calls visit(item), which returns the square of the radius from then on: the same or less. Every item whose box
-    /// is within the radius that is left is visited, and some that are further.
+    /// Calls visit(item), which returns the square of the radius from then on: the same or less. Every item whose box
+    /// is within the radius that is left is visited, and some that are further. `point` has to be finite.
     template <class Visit>
     void visit_near(const Vec3f& point, float squared_radius, const Visit& visit) const;
 
