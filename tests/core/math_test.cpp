@@ -19,7 +19,10 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 class Arguments {
 public:
     double between(double low, double high) { return low + (high - low) * unit(); }
-    double of_any_size() { return std::ldexp(between(0.5, 1.5), int(random_() % 2000) - 1000); }
+    double of_any_size() {
+        const int exponent = int(random_() % 2000) - 1000; // first: compilers evaluate arguments in orders of their own
+        return std::ldexp(between(0.5, 1.5), exponent);
+    }
 
 private:
     double unit() { return double(random_() >> 11) * 0x1p-53; }
