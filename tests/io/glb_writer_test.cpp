@@ -163,7 +163,7 @@ TEST(GlbWriter, PlacesFarFromZeroAreANodesTranslation) {
     EXPECT_EQ(glb.attribute<Vec3f>("POSITION"), mesh.positions);
     const Json& node = glb.json["nodes"][0];
     EXPECT_EQ(node["translation"], Json({500000.0, -4500000.0, 0.0}));
-    EXPECT_EQ(glb.json["scenes"][0]["nodes"], Json({0}));
+    EXPECT_EQ(glb.json["scenes"][0]["nodes"], Json::array({0}));
     EXPECT_FALSE(write(square()).glb.json["nodes"][0].contains("translation"));
 }
 
