@@ -13,8 +13,8 @@ namespace filigree::studio {
 namespace {
 
 constexpr double kFlight = 0.25; // s on the way to another camera
-constexpr double kLatest = 1;    // s that are looked at while a body moves, as its future is not known
-constexpr double kLag = 0.15;    // s that the camera then stays behind
+constexpr double kLatest = 1.5;  // s that are looked at while a body moves, as its future is not known
+constexpr double kLag = 0.1;     // s that the camera then stays behind
 
 /// Where a mesh is looked at from when it is opened: from the front, a little from the right and above.
 Vec3d first_direction(UpAxis up) {
