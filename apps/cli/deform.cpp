@@ -19,7 +19,7 @@ struct DeformArguments {
     std::string input, output, handles, pose_output;
     std::vector<WarpStep> steps; ///< in the order in which they were given
     std::optional<Axis> axis = {};
-    std::uint64_t seed = 1;
+    std::size_t seed = 1;
     RestoreOptions restore;
     std::optional<HeightLaw> law; ///< reference code
     std::size_t frames = 0;       ///< of an animation; 0: the full deformation alone

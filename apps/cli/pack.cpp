@@ -145,13 +145,13 @@ void run(PackArguments options, Session& session) {
 
 struct UnpackArguments {
     std::string input, output;
-    std::optional<std::uint64_t> bytes;
+    std::optional<std::size_t> bytes;
 };
 
 /// The mesh that the first bytes of a stream give.
 void unpack_beginning(const UnpackArguments& options, Session& session) {
     const FileReader file = session.open(options.input);
-    std::string beginning(std::min(*options.bytes, file.size()), '\0');
+    std::string beginning(std::min<std::uint64_t>(*options.bytes, file.size()), '\0');
     require(file.read(0, beginning));
     ModelStream stream(options.input);
     require(stream.feed(beginning));

@@ -21,7 +21,7 @@ struct SampleArguments {
     std::vector<std::size_t> frustum;
     InsideOptions inside;
     Pattern pattern = Pattern::lattice;
-    std::uint64_t seed = 1;
+    std::size_t seed = 1;
     std::optional<UpAxis> up;
 };
 
