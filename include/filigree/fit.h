@@ -44,7 +44,7 @@ struct FitOptions {
     /// other packed files lose them.
     unsigned weight_rounds = 0;
     /// Whether gradients stay near the driver's own motion, so that viewers, which turn the normals of a skin by them,
-    /// shade it right. It follows less closely: 1.1 to 1.6 times the error was met.
+    /// shade it right. The errors that were measured are 1.1 to 1.6 times as large.
     bool sound_gradients = false;
 };
 
