@@ -15,5 +15,5 @@ set(CMAKE_CXX_FLAGS_INIT "--target=wasm32-wasi --sysroot=/usr -msimd128 -fwasm-e
 set(CMAKE_EXE_LINKER_FLAGS_INIT "-L/usr/lib/llvm-16/lib/wasm32-wasi -L/usr/lib/wasm32-wasi -Wl,-z,stack-size=8388608")
 file(GLOB system ${FILIGREE_PLATFORMS}/wasm/system/*.o)
 list(JOIN system " " system)
-set(CMAKE_CXX_STANDARD_LIBRARIES "${system} -lwasi-emulated-signal")
+set(CMAKE_CXX_STANDARD_LIBRARIES "${system} -lwasi-emulated-signal -lc-printscan-long-double")
 include(${CMAKE_CURRENT_LIST_DIR}/cross.cmake)
