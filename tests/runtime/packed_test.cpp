@@ -31,6 +31,7 @@ Packed pack_records(const Model& model, const PoseSequence& poses = {}, PackOpti
     packed.report = pack_model(model, poses, options, path, kOneThread).value();
     std::ifstream file(path, std::ios::binary);
     packed.bytes.assign((std::istreambuf_iterator<char>(file)), {});
+    file.close();
     std::filesystem::remove(path);
     return packed;
 }

@@ -205,7 +205,7 @@ TEST_F(SceneRunTest, ABodyThatCannotCarryItselfIsToldBeforeTheWork) {
 }
 
 TEST_F(SceneRunTest, WhatWouldDoIsASizeWhereTheSceneGivesOne) {
-    const std::string mesh = (std::filesystem::temp_directory_path() / "filigree_weight_test.ply").string();
+    const std::string mesh = (std::filesystem::temp_directory_path() / "filigree_weight_test.ply").generic_string();
     ASSERT_TRUE(write_mesh(make_wavy_cube({.resolution = 8}), mesh, {}, kOneThread));
     const auto said = [&](const std::string& body) {
         const ReadyScene ready =
@@ -220,7 +220,7 @@ TEST_F(SceneRunTest, WhatWouldDoIsASizeWhereTheSceneGivesOne) {
 }
 
 TEST_F(SceneRunTest, SizeIsTheLongestSideOfAMesh) {
-    const std::string mesh = (std::filesystem::temp_directory_path() / "filigree_size_test.ply").string();
+    const std::string mesh = (std::filesystem::temp_directory_path() / "filigree_size_test.ply").generic_string();
     ASSERT_TRUE(write_mesh(make_wavy_cube({.resolution = 8, .size = 9.3}), mesh, {}, kOneThread));
     const std::string body = "[[body]]\nmesh = \"" + mesh + "\"\nparticles = 200\ndriver = 60\n";
     const ReadyScene ready = set_up(scene(body + "size = 0.5\n"), kOneThread).value();

@@ -8,23 +8,14 @@
 #include "filigree/io/system/numbered_name.h"
 #include "filigree/io/system/platform.h"
 #include "filigree/io/system/temporary_file.h"
+#include "filigree/render/child_process.h"
 
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
-#include <csignal>
 #include <optional>
 #include <sstream>
 #include <system_error>
-
-#include <fcntl.h>
-#include <poll.h>
-#include <spawn.h>
-#include <sys/socket.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-extern char** environ;
 
 namespace filigree {
 
@@ -70,7 +61,7 @@ public:
         return *this;
     }
     ~TemporaryFile() {
-        if (!path_.empty()) ::unlink(path_.c_str());
+        if (!path_.empty()) platform::remove_file(path_);
     }
 
     const fs::path& path() const { return path_; }
@@ -80,7 +71,7 @@ public:
         std::error_code failed;
         const fs::file_status existing = fs::status(real_target_, failed);
         if (fs::is_regular_file(existing)) fs::permissions(path_, existing.permissions(), failed); // best effort
-        if (::rename(path_.c_str(), real_target_.c_str()) != 0) return errno;
+        if (const int error = platform::rename(path_, real_target_)) return error;
         path_.clear();
         platform::flush_folder(real_target_.parent_path());
         return 0;
@@ -91,105 +82,6 @@ private:
         : path_(std::move(path)), real_target_(std::move(real_target)), owner_(std::move(owner)) {}
     fs::path path_, real_target_;
     FileDescriptor owner_; ///< tells other writers that the file is ours
-};
-
-/// A child process that reads what we send and whose complaints we hear. Killed when it goes away unfinished.
-class Process {
-public:
-    /// 0 or the error number; ENOENT when there is no such program.
-    int start(std::vector<std::string> words) {
-        int input[2], errors[2];
-        // A socket, not a pipe: sending to a process that has ended is an error then, and never a signal.
-        if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, input) != 0) return errno;
-        input_ = FileDescriptor(input[0]);
-        const FileDescriptor child_input(input[1]);
-        if (::pipe2(errors, O_CLOEXEC) != 0) return errno;
-        errors_ = FileDescriptor(errors[0]);
-        const FileDescriptor child_errors(errors[1]);
-
-        std::vector<char*> arguments;
-        for (std::string& word : words) arguments.push_back(word.data());
-        arguments.push_back(nullptr);
-        posix_spawn_file_actions_t streams;
-        posix_spawn_file_actions_init(&streams);
-        posix_spawn_file_actions_adddup2(&streams, child_input.get(), STDIN_FILENO);
-        posix_spawn_file_actions_addopen(&streams, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-        posix_spawn_file_actions_adddup2(&streams, child_errors.get(), STDERR_FILENO);
-        posix_spawnattr_t attributes;
-        posix_spawnattr_init(&attributes);
-        sigset_t defaults;
-        sigemptyset(&defaults);
-        sigaddset(&defaults, SIGPIPE); // we ignore it, and children inherit that
-        posix_spawnattr_setsigdefault(&attributes, &defaults);
-        posix_spawnattr_setpgroup(&attributes, 0); // Ctrl-C is for us: we say when the child ends
-        posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
-        pid_t child = -1;
-        const int failed = ::posix_spawnp(&child, words[0].c_str(), &streams, &attributes, arguments.data(), environ);
-        posix_spawnattr_destroy(&attributes);
-        posix_spawn_file_actions_destroy(&streams);
-        if (!failed) child_ = child;
-        return failed;
-    }
-    Process() = default;
-    Process(const Process&) = delete;
-    Process& operator=(const Process&) = delete;
-    ~Process() {
-        if (child_ < 0) return;
-        ::kill(child_, SIGKILL);
-        wait();
-    }
-
-    /// False when the child has stopped listening. It is heard all the while: else it could wait for us to listen
-    /// while we wait for it.
-    bool send(std::string_view bytes) {
-        while (!bytes.empty()) {
-            pollfd waiting[2] = {{input_.get(), POLLOUT, 0}, {errors_.get(), POLLIN, 0}};
-            if (::poll(waiting, 2, -1) < 0 && errno != EINTR) return false;
-            if (waiting[1].revents) listen();
-            if (!waiting[0].revents) continue;
-            const ssize_t sent = ::send(input_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
-            if (sent < 0 && errno != EINTR && errno != EAGAIN) return false;
-            if (sent > 0) bytes.remove_prefix(static_cast<std::size_t>(sent));
-        }
-        return true;
-    }
-
-    /// Says that this was all and waits for the end; whether the child is content.
-    bool finish() {
-        input_.close();
-        while (errors_.is_open()) listen();
-        const int status = wait();
-        return WIFEXITED(status) && WEXITSTATUS(status) == 0;
-    }
-
-    /// The start of what it said on stderr.
-    const std::string& complaint() const { return complaint_; }
-
-private:
-    /// Waits for something on stderr, keeps the start of it, and closes it at its end.
-    void listen() {
-        constexpr std::size_t kMostKept = 4096;
-        char bytes[4096];
-        const ssize_t got = ::read(errors_.get(), bytes, sizeof bytes);
-        if (got < 0 && errno == EINTR) return;
-        if (got <= 0) {
-            errors_.close();
-            return;
-        }
-        complaint_.append(bytes, std::min(static_cast<std::size_t>(got), kMostKept - complaint_.size()));
-    }
-
-    int wait() {
-        int status = -1;
-        while (::waitpid(child_, &status, 0) < 0 && errno == EINTR) {
-        }
-        child_ = -1;
-        return status;
-    }
-
-    pid_t child_ = -1;
-    FileDescriptor input_, errors_;
-    std::string complaint_;
 };
 
 /// The first line of ffmpeg's complaint, which names the cause; those after it name what followed from it.
@@ -296,8 +188,9 @@ public:
 
     Status finish() override {
         if (!ffmpeg_.finish()) return failure();
-        const FileDescriptor film(::open(file_.path().c_str(), O_RDONLY | O_CLOEXEC));
-        if (!film.is_open() || ::fsync(film.get()) != 0) return cannot_write(target_, "the disk failed");
+        FileDescriptor film(platform::open_to_write(file_.path()));
+        if (!film.is_open() || platform::flush(film.get()) != 0) return cannot_write(target_, "the disk failed");
+        film.close();
         if (const int failed = file_.put_in_place()) return cannot_write(target_, failed);
         return Success{};
     }
@@ -311,7 +204,7 @@ private:
 
     fs::path target_;
     TemporaryFile file_;
-    Process ffmpeg_; // below the file, so that it ends before the file is removed
+    ChildProcess ffmpeg_; // below the file, so that it ends before the file is removed
     unsigned padded_width_ = 0, padded_height_ = 0;
     std::string rgb_;
 };
@@ -354,7 +247,7 @@ Result<FilmWriter> FilmWriter::create(const fs::path& path, unsigned width, unsi
     if (fs::is_directory(path, ignored)) return cannot_write(path, "it is a folder");
     if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored))
         return cannot_write(path, "it is a device or pipe, and films need a file");
-    if (fs::exists(path, ignored) && ::access(path.c_str(), W_OK) != 0)
+    if (fs::exists(path, ignored) && platform::refused_writing(path) != 0)
         return cannot_write(path, "permission is denied");
 
     // Whether the folder takes files is told at once.

@@ -95,14 +95,15 @@ private:
         const std::unique_ptr<void, decltype(&tjDestroy)> decoder(tjInitDecompress(), tjDestroy);
         if (!decoder) throw std::bad_alloc();
         const auto* const data = reinterpret_cast<const unsigned char*>(bytes_.data());
+        const auto size = static_cast<unsigned long>(bytes_.size()); // Windows: below 4 GiB, as all JPEGs are
         int width = 0, height = 0, subsampling = 0, color_space = 0;
-        if (tjDecompressHeader3(decoder.get(), data, bytes_.size(), &width, &height, &subsampling, &color_space) != 0 &&
+        if (tjDecompressHeader3(decoder.get(), data, size, &width, &height, &subsampling, &color_space) != 0 &&
             !is_harmless(decoder.get()))
             return jpeg_error(decoder.get());
         Result<Picture> picture = allocate(static_cast<unsigned>(width), static_cast<unsigned>(height));
         if (!picture) return picture;
         const bool is_cmyk = color_space == TJCS_CMYK || color_space == TJCS_YCCK;
-        if (tjDecompress2(decoder.get(), data, bytes_.size(), picture->rgba.data(), width, 0, height,
+        if (tjDecompress2(decoder.get(), data, size, picture->rgba.data(), width, 0, height,
                           is_cmyk ? TJPF_CMYK : TJPF_RGBA, TJFLAG_LIMITSCANS | TJFLAG_ACCURATEDCT) != 0 &&
             !is_harmless(decoder.get()))
             return jpeg_error(decoder.get());

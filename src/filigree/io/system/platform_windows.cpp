@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
+#include <functional>
 
 #define WIN32_LEAN_AND_MEAN
 #ifndef NOMINMAX
@@ -65,6 +66,16 @@ int error_number(DWORD error) {
     }
 }
 int failure(bool done) { return done ? 0 : error_number(::GetLastError()); }
+
+/// For about a second: a file that another program has open for a moment can be neither replaced nor removed meanwhile.
+int patiently(const std::function<bool()>& change) {
+    int failed = failure(change());
+    for (DWORD wait = 1; failed == EACCES && wait <= 512; wait *= 2) { // milliseconds
+        ::Sleep(wait);
+        failed = failure(change());
+    }
+    return failed;
+}
 
 int open(const Path& path, DWORD access, DWORD how, DWORD flags = 0) {
     const HANDLE handle =
@@ -247,12 +258,14 @@ Locked lock(int descriptor) {
 }
 
 int rename(const Path& from, const Path& to) {
-    return failure(::MoveFileExW(from.c_str(), to.c_str(), MOVEFILE_REPLACE_EXISTING) != 0);
+    return patiently([&] { return ::MoveFileExW(from.c_str(), to.c_str(), MOVEFILE_REPLACE_EXISTING) != 0; });
 }
 int link(const Path& from, const Path& to) {
     return failure(::CreateHardLinkW(to.c_str(), from.c_str(), nullptr) != 0);
 }
-int remove_file(const Path& path) { return failure(::DeleteFileW(path.c_str()) != 0); }
+int remove_file(const Path& path) {
+    return patiently([&] { return ::DeleteFileW(path.c_str()) != 0; });
+}
 int remove_empty_folder(const Path& path) { return failure(::RemoveDirectoryW(path.c_str()) != 0); }
 int make_folder(const Path& path) { return failure(::CreateDirectoryW(path.c_str(), nullptr) != 0); }
 int set_permissions(int, unsigned) { return 0; } // a file that may be replaced is not read-only

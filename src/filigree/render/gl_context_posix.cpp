@@ -1,3 +1,6 @@
+// OpenGL without a window, by EGL. Of Windows: gl_context_windows.cpp.
+#if !defined(_WIN32)
+
 #include "filigree/render.h"
 
 #include <dlfcn.h>
@@ -104,3 +107,5 @@ Result<HeadlessContext> HeadlessContext::create() {
 }
 
 } // namespace filigree
+
+#endif
