@@ -23,6 +23,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
+#if defined(_WIN32)
+constexpr const char* kHowToInstallFfmpeg = "put ffmpeg.exe into a folder that PATH names";
+#else
+constexpr const char* kHowToInstallFfmpeg = "apt-get install ffmpeg";
+#endif
+
 enum class FilmKind { none, mp4, gif, numbered };
 
 FilmKind film_kind(const fs::path& path) {
@@ -173,8 +179,8 @@ public:
             ffmpeg_.start(ffmpeg_command(kind, padded_width_, padded_height_, frames_per_second, file_.path()));
         if (failed == ENOENT || failed == EACCES || failed == ENOTDIR)
             return Error{ErrorCode::unsupported,
-                         target_.string() + ": ffmpeg is not installed; apt-get install ffmpeg, or write numbered "
-                                            "pictures (frame_%04d.png)."};
+                         target_.string() + ": ffmpeg is not installed; " + kHowToInstallFfmpeg +
+                             ", or write numbered pictures (frame_%04d.png)."};
         if (failed) return cannot_write(target_, "ffmpeg cannot be started (error " + std::to_string(failed) + ")");
         return Success{};
     }

@@ -66,7 +66,9 @@ struct HeadlessContext::Content {
         const HGLRC first = wglCreateContext(device);
         if (!first || !wglMakeCurrent(device, first)) return "windows have no OpenGL";
         const PROC function = wglGetProcAddress("wglCreateContextAttribsARB");
-        if (function) context = reinterpret_cast<CreateContext>(reinterpret_cast<void*>(function))(device, nullptr, kWanted.data());
+        if (function)
+            context =
+                reinterpret_cast<CreateContext>(reinterpret_cast<void*>(function))(device, nullptr, kWanted.data());
         wglMakeCurrent(nullptr, nullptr);
         wglDeleteContext(first);
         if (!context || !wglMakeCurrent(device, context)) return "the driver is older";
