@@ -162,6 +162,8 @@ public:
             remove_batch(path_);
         } catch (const std::bad_alloc&) { // it stays, as after a kill, and the next batch clears it away
         }
+        lock_.reset();
+        platform::remove_empty_folder(path_); // on Windows the lock's file is gone when it is closed
     }
     Folder(const Folder&) = delete;
     Folder& operator=(const Folder&) = delete;
@@ -278,12 +280,16 @@ Status complete_batches(const fs::path& folder) {
         const fs::path batch = folder / path_of(name);
         const auto status = platform::status_of_name(batch);
         if (!status || status->kind != Kind::folder || !status->is_own) continue;
-        const Lock lock(batch / kLock, false);
-        if (!lock.is_there()) platform::remove_empty_folder(batch); // all but the empty folder was removed
-        if (!lock.is_held()) continue;
-        if (placing)
-            if (Status placed = place_rest(batch, folder); !placed) return placed;
-        remove_batch(batch);
+        {
+            const Lock lock(batch / kLock, false);
+            if (lock.is_there() && !lock.is_held()) continue;
+            if (lock.is_held()) {
+                if (placing)
+                    if (Status placed = place_rest(batch, folder); !placed) return placed;
+                remove_batch(batch);
+            }
+        }
+        platform::remove_empty_folder(batch); // all but the empty folder was removed, by us or before
     }
     return Success{};
 }
