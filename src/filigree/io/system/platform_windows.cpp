@@ -67,7 +67,7 @@ int error_number(DWORD error) {
 }
 int failure(bool done) { return done ? 0 : error_number(::GetLastError()); }
 
-/// For about a second: a file that another program has open for a moment can be neither replaced nor removed meanwhile.
+/// For about a second: a file that another program has open for a moment cannot be replaced meanwhile.
 int patiently(const std::function<bool()>& change) {
     int failed = failure(change());
     for (DWORD wait = 1; failed == EACCES && wait <= 512; wait *= 2) { // milliseconds
@@ -263,9 +263,7 @@ int rename(const Path& from, const Path& to) {
 int link(const Path& from, const Path& to) {
     return failure(::CreateHardLinkW(to.c_str(), from.c_str(), nullptr) != 0);
 }
-int remove_file(const Path& path) {
-    return patiently([&] { return ::DeleteFileW(path.c_str()) != 0; });
-}
+int remove_file(const Path& path) { return failure(::DeleteFileW(path.c_str()) != 0); }
 int remove_empty_folder(const Path& path) { return failure(::RemoveDirectoryW(path.c_str()) != 0); }
 int make_folder(const Path& path) { return failure(::CreateDirectoryW(path.c_str(), nullptr) != 0); }
 int set_permissions(int, unsigned) { return 0; } // a file that may be replaced is not read-only
