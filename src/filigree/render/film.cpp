@@ -178,9 +178,9 @@ public:
         const int failed =
             ffmpeg_.start(ffmpeg_command(kind, padded_width_, padded_height_, frames_per_second, file_.path()));
         if (failed == ENOENT || failed == EACCES || failed == ENOTDIR)
-            return Error{ErrorCode::unsupported,
-                         target_.string() + ": ffmpeg is not installed; " + kHowToInstallFfmpeg +
-                             ", or write numbered pictures (frame_%04d.png)."};
+            return Error{ErrorCode::unsupported, target_.string() + ": ffmpeg is not installed; " +
+                                                     kHowToInstallFfmpeg +
+                                                     ", or write numbered pictures (frame_%04d.png)."};
         if (failed) return cannot_write(target_, "ffmpeg cannot be started (error " + std::to_string(failed) + ")");
         return Success{};
     }
