@@ -3,17 +3,12 @@
 #include "filigree/render/child_process.h"
 
 #include "filigree/io/system/platform.h"
+#include "filigree/io/system/windows_calls.h"
 
 #include <algorithm>
 #include <cerrno>
 #include <thread>
 #include <utility>
-
-#define WIN32_LEAN_AND_MEAN
-#ifndef NOMINMAX
-#define NOMINMAX
-#endif
-#include <windows.h>
 
 namespace filigree {
 

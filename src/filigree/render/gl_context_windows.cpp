@@ -3,15 +3,11 @@
 
 #include "filigree/render.h"
 
+#include "filigree/io/system/windows_calls.h"
+
 #include <epoxy/gl.h>
 
 #include <array>
-
-#define WIN32_LEAN_AND_MEAN
-#ifndef NOMINMAX
-#define NOMINMAX
-#endif
-#include <windows.h>
 
 namespace filigree {
 
@@ -22,7 +18,8 @@ Error no_opengl(const std::string& reason) {
             "No OpenGL 4.3 was found (" + reason + "); install the driver of the graphics card's maker."};
 }
 
-// Windows' own functions, not those of epoxy: a table of functions for each context is what epoxy has in a DLL alone.
+// Windows' own functions are called here. epoxy's keep a table for each context, and do that only in a DLL: linked
+// statically they crash with the second context.
 using CreateContext = HGLRC(WINAPI*)(HDC, HGLRC, const int*); // of WGL_ARB_create_context
 constexpr int kMajorVersion = 0x2091, kMinorVersion = 0x2092, kProfiles = 0x9126, kCoreProfile = 1;
 constexpr std::array<int, 7> kWanted = {kMajorVersion, 4, kMinorVersion, 3, kProfiles, kCoreProfile, 0};

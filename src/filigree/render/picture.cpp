@@ -1,7 +1,9 @@
 #include "filigree/io/system/file.h"
 #include "filigree/render.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -95,7 +97,9 @@ private:
         const std::unique_ptr<void, decltype(&tjDestroy)> decoder(tjInitDecompress(), tjDestroy);
         if (!decoder) throw std::bad_alloc();
         const auto* const data = reinterpret_cast<const unsigned char*>(bytes_.data());
-        const auto size = static_cast<unsigned long>(bytes_.size()); // Windows: below 4 GiB, as all JPEGs are
+        // On Windows this number has 32 bits. A longer file is then read as one that is cut off, and refused if it is.
+        const auto size = static_cast<unsigned long>(
+            std::min<std::uint64_t>(bytes_.size(), std::numeric_limits<unsigned long>::max()));
         int width = 0, height = 0, subsampling = 0, color_space = 0;
         if (tjDecompressHeader3(decoder.get(), data, size, &width, &height, &subsampling, &color_space) != 0 &&
             !is_harmless(decoder.get()))

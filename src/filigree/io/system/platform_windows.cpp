@@ -2,18 +2,13 @@
 #if defined(_WIN32)
 
 #include "filigree/io/system/platform.h"
+#include "filigree/io/system/windows_calls.h"
 
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
-
-#define WIN32_LEAN_AND_MEAN
-#ifndef NOMINMAX
-#define NOMINMAX
-#endif
-#include <windows.h>
 
 #include <bcrypt.h>
 #include <fcntl.h>
